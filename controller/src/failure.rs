@@ -420,6 +420,13 @@ fn in_use_text(in_use: Option<&str>) -> String {
 }
 
 impl Failure {
+    /// That nothing corrects `axis`.
+    pub(crate) fn not_calibrated(axis: &str) -> Self {
+        Self::NotCalibrated {
+            what: format!("axis {axis} has no calibration"),
+        }
+    }
+
     /// The failure of one kind of machine, where it is one of that kind.
     pub fn of_kind<K: KindFailure>(&self) -> Option<&K> {
         match self {

@@ -46,6 +46,11 @@ impl Core<'_> {
             dead_path_corrected: corrections.dead_path.is_some(),
             cosine_corrected: corrections.cosine.is_some(),
             standard_uncertainty_m: config.instrument_standard_uncertainty_nm * 1e-9,
+            switched_off: config
+                .switched_off()
+                .iter()
+                .map(|it| it.name.to_owned())
+                .collect(),
         }
     }
 

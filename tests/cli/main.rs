@@ -7,6 +7,7 @@ mod demo;
 mod example;
 mod examples;
 mod gantry;
+mod intended;
 mod interrupted;
 mod job;
 mod jog;

@@ -1,5 +1,7 @@
 //! Whatever number a file holds: it is judged, and nothing breaks.
 
+use std::collections::HashSet;
+
 use toml::{Table, Value};
 
 use super::parse;
@@ -48,6 +50,9 @@ fn no_number_breaks_the_judgement_and_what_is_no_number_is_refused() {
         let document = Value::Table(text.parse::<Table>().expect("it is sound"));
         let mut ways = Vec::new();
         numbers(&document, &mut Vec::new(), &mut ways);
+        // Axes are judged alike: each of their keys once, whatever they are called.
+        let mut seen = HashSet::new();
+        ways.retain(|way| seen.insert([&way[..1], way.get(2..).unwrap_or_default()].concat()));
         assert!(ways.len() > 30, "{}", ways.len());
         for way in ways {
             for impossible in [f64::NAN, f64::INFINITY] {

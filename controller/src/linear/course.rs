@@ -61,9 +61,7 @@ impl Corrected {
     /// Nothing corrects it, or not as far as that, and nobody has agreed to it.
     pub fn require(self, axis: &str, target: Metres, agreed: Agreed) -> Result<(), Failure> {
         match self {
-            Self::No if !agreed.uncompensated => Err(Failure::NotCalibrated {
-                what: format!("axis {axis} has no calibration"),
-            }),
+            Self::No if !agreed.uncompensated => Err(Failure::not_calibrated(axis)),
             Self::Held { first, last } | Self::Fading { first, last, .. } if !agreed.beyond => {
                 let axis = axis.to_owned();
                 Err(Failure::BeyondCalibrated {

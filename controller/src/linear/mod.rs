@@ -31,6 +31,7 @@ mod run_plan;
 pub(crate) mod settings;
 mod sound;
 mod stage;
+pub(crate) mod stored;
 mod survey;
 pub(crate) mod sweep;
 mod table_correction;

@@ -25,6 +25,37 @@ pub fn harmless(config: &MachineConfig, axis: &str) -> Metres {
     configured.max((count / 2.0).min(HARMLESS_MAX))
 }
 
+/// Whether the soft limits of `axis` allow for `target`.
+///
+/// # Errors
+/// They do not, or there is no such axis.
+pub(crate) fn require_within(
+    config: &MachineConfig,
+    axis: &str,
+    target: Metres,
+) -> Result<(), Failure> {
+    let own = config.axis.get(axis).ok_or_else(|| no_such(config, axis))?;
+    let min = Metres::from_mm(own.motion.soft_min_mm);
+    let max = Metres::from_mm(own.motion.soft_max_mm);
+    if target >= min && target <= max {
+        return Ok(());
+    }
+    Err(Failure::Machine(machine::Failure::SoftLimit {
+        axis: axis.to_owned(),
+        target,
+        min,
+        max,
+    }))
+}
+
+fn no_such(config: &MachineConfig, axis: &str) -> Failure {
+    let known: Vec<&str> = config.axis.keys().map(String::as_str).collect();
+    Failure::Machine(machine::Failure::NoSuchAxis {
+        axis: axis.to_owned(),
+        known: known.join(", "),
+    })
+}
+
 /// A table made ready to be applied to `axis` within the limits of the configuration.
 ///
 /// # Errors

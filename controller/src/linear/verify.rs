@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use compensator::budget::Combined;
 use compensator::error_table::ErrorTable;
 use compensator::iso230::{self, Figures};
-use units::{Approach, Metres};
+use units::{Approach, Metres, MetresPerSecond};
 
+use crate::config::AxisConfig;
 use crate::failure::Failure;
 use crate::linear::VerifyConfig;
 use crate::linear::calibrate::{self, open_journal};
@@ -69,13 +70,7 @@ impl LinearStage<'_> {
     /// What a calibration or a verification of the axis would do; `None` for what is not configured, and for
     /// everything that does not measure.
     pub fn planned(&self, of: Stage) -> Option<PlannedRun> {
-        let plan = match of {
-            Stage::Calibrate => calibrate::run_plan(self.config.calibrate.as_ref()?),
-            Stage::Verify => run_plan(self.config.verify.as_ref()?, 0.0),
-            Stage::Zero | Stage::Reference | Stage::Job => return None,
-        };
-        let settings = self.core.axis_settings(self.axis).ok()?;
-        Some(plan.planned(settings.speed))
+        Some(plan_of(self.config, of)?.planned(speed_of(self.config)))
     }
 
     /// Measures the axis at the configuration's verification targets and evaluates ISO 230-2.
@@ -201,6 +196,20 @@ fn systematic_deviation(table: &ErrorTable) -> Metres {
     let largest = deviations().fold(Metres(f64::NEG_INFINITY), Metres::max);
     let smallest = deviations().fold(Metres(f64::INFINITY), Metres::min);
     largest - smallest
+}
+
+/// The measuring run that is configured for `axis`.
+pub(crate) fn plan_of(axis: &AxisConfig, of: Stage) -> Option<RunPlan> {
+    match of {
+        Stage::Calibrate => Some(calibrate::run_plan(axis.calibrate.as_ref()?)),
+        Stage::Verify => Some(run_plan(axis.verify.as_ref()?, 0.0)),
+        Stage::Zero | Stage::Reference | Stage::Job => None,
+    }
+}
+
+/// How fast an axis goes unless it is told otherwise.
+pub(crate) fn speed_of(axis: &AxisConfig) -> MetresPerSecond {
+    MetresPerSecond(axis.motion.speed_mm_per_s * 1e-3)
 }
 
 fn run_plan(config: &VerifyConfig, scale_limit_ppm: f64) -> RunPlan {

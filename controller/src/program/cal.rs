@@ -128,6 +128,10 @@ pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure>
         "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, {lines}",
         head.machine, head.stage_serial, head.axis, head.created, head.program, head.source,
     );
+    let text = match head.instrument.warning() {
+        Some(warning) => format!("{text}\nwarning: its readings were {warning}"),
+        None => text,
+    };
     Ok((text, json!({"id": id, "record": value})))
 }
 

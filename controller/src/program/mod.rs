@@ -2,6 +2,7 @@
 
 mod align;
 mod ask;
+mod before;
 mod cal;
 mod check;
 mod data;
@@ -9,6 +10,7 @@ mod data_file;
 mod demo;
 mod exchange;
 mod explain;
+mod intended;
 mod jog;
 mod json;
 mod kept;
@@ -40,6 +42,7 @@ mod targets;
 mod text;
 mod verbs;
 mod volumetric;
+mod warnings;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -49,10 +52,9 @@ use wire::lockstep::path_of;
 
 use crate::ports::Pace;
 use crate::{Agreed, Failure};
-use kind::by_kind;
+use intended::Intent;
 use output::Output;
 use rotary::readings::ReadingsArgs;
-use verbs::Verbs;
 
 /// What a shell script learns of an end: [`crate::Failure::exit_code`].
 const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
@@ -85,7 +87,7 @@ enum Command {
     /// Acknowledge the fault of a drive, once; nothing moves.
     Reset(AxisArgs),
     /// Find the origin: with Hall sensors, on index pulses, or on an index mark.
-    Zero(AxisArgs),
+    Zero(ZeroArgs),
     /// Zero, measure the deviations, store and activate the calibration.
     Calibrate(CalibrateArgs),
     /// Zero, measure between the calibrated positions, judge.
@@ -205,10 +207,24 @@ struct AxisArgs {
     axis: Option<String>,
 }
 
-impl AxisArgs {
-    fn by_kind(&self, verb: impl FnOnce(&Verbs) -> output::Ended) -> output::Ended {
-        by_kind(&self.machine, self.axis.as_deref().into_iter(), verb)
-    }
+#[derive(Clone, Debug, Args)]
+struct ZeroArgs {
+    #[command(flatten)]
+    axis: AxisArgs,
+    #[command(flatten)]
+    ask: AskArgs,
+}
+
+/// Whether somebody is asked.
+#[derive(Clone, Copy, Debug, Args)]
+struct AskArgs {
+    /// Say what would be done, and what that depends upon; no port is opened, nothing moves.
+    #[arg(long)]
+    dry_run: bool,
+    /// Ask nothing: neither on a terminal, before anything moves, whether to go on; nor, where a person turns
+    /// the plate of a rotary table or sets up the lines of an interferometer, whether that is done.
+    #[arg(long)]
+    yes: bool,
 }
 
 /// What a bare `--resume` stands for; no file is called that by accident.
@@ -224,10 +240,8 @@ struct CalibrateArgs {
     /// Save even if the first and the last measurement of one place differ by more than the limit.
     #[arg(long)]
     accept_drift: bool,
-    /// Do not wait for the person who turns the plate of a rotary table, or sets up the lines of
-    /// an interferometer.
-    #[arg(long)]
-    yes: bool,
+    #[command(flatten)]
+    ask: AskArgs,
     #[command(flatten)]
     readings: ReadingsArgs,
     /// Three axes: let them move to and fro for this long, then measure again what heat changed.
@@ -245,9 +259,8 @@ struct VerifyArgs {
     /// Continue the newest interrupted run of this axis, or the journal given.
     #[arg(long, value_name = "JOURNAL", num_args = 0..=1, default_missing_value = NEWEST_RUN)]
     resume: Option<PathBuf>,
-    /// Do not wait for the person who turns the plate of a rotary table.
-    #[arg(long)]
-    yes: bool,
+    #[command(flatten)]
+    ask: AskArgs,
     #[command(flatten)]
     readings: ReadingsArgs,
 }
@@ -334,6 +347,8 @@ struct MoveArgs {
     way: Option<WayName>,
     #[command(flatten)]
     agreed: AgreedArgs,
+    #[command(flatten)]
+    ask: AskArgs,
 }
 
 /// What is agreed to in so many words: what nothing corrects does not move unasked.
@@ -435,26 +450,10 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>, version: &'static s
         Command::Check { config } => check::run(&config, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => reset::run(&args, output),
-        Command::Zero(args) => {
-            kept::or_by_its_service(args.by_kind(|kind| (kind.zero)(&args, output)), |service| {
-                service.zero(&args, output)
-            })
-        }
-        Command::Calibrate(args) => kept::or_by_its_service(
-            args.axis.by_kind(|kind| (kind.calibrate)(&args, output)),
-            |service| service.calibrate(&args, output),
-        ),
-        Command::Verify(args) => kept::or_by_its_service(
-            args.axis.by_kind(|kind| (kind.verify)(&args, output)),
-            |service| service.verify(&args, output),
-        ),
-        Command::Move(args) => {
-            let args = args.settle();
-            let here = by_kind(&args.machine, args.named(), |kind| {
-                (kind.move_to)(&args, output)
-            });
-            kept::or_by_its_service(here, |service| service.move_to(&args, output))
-        }
+        Command::Zero(args) => before::run(Intent::Zero(&args), output),
+        Command::Calibrate(args) => before::run(Intent::Calibrate(&args), output),
+        Command::Verify(args) => before::run(Intent::Verify(&args), output),
+        Command::Move(args) => before::run(Intent::Move(&args.settle()), output),
         Command::Jog(args) => {
             let args = args.settle();
             kept::or_by_its_service(jog::run(&args, output), |service| {

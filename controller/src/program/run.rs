@@ -17,7 +17,7 @@ pub(crate) struct RunArgs {
     machine: MachineArgs,
     /// The job (`.toml`); or the path: columns time_s and AXIS_mm of each axis, in steps of the SYNC period.
     path: Option<PathBuf>,
-    /// Judge the job and say what it would do; no port is opened, nothing moves.
+    /// Judge the job or the path and say what it would do; no port is opened, nothing moves.
     #[arg(long)]
     dry_run: bool,
     /// Do not wait for the operator of a job.
@@ -64,14 +64,12 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
         })
     };
     let of_paths = is_first || uncompensated;
-    let of_jobs = yes || dry_run || beyond || resume.is_some();
+    let of_jobs = yes || beyond || resume.is_some();
     match (is_job, of_paths, of_jobs) {
         (true, true, _) => {
             usage("--first-part and --uncompensated are for paths of three axes, and this is a job")
         }
-        (false, _, true) => {
-            usage("--dry-run, --yes, --beyond and --resume are for jobs, and this is a path")
-        }
+        (false, _, true) => usage("--yes, --beyond and --resume are for jobs, and this is a path"),
         (true, false, _) => {
             let options = JobOptions {
                 dry_run,
@@ -84,6 +82,7 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
         (false, _, false) if is_first && uncompensated => {
             usage("--first-part records what the correction leaves: not with --uncompensated")
         }
+        (false, _, false) if dry_run => part::only_judged(&machine, &path, !uncompensated, output),
         (false, _, false) => part::run(&machine, &path, (is_first, uncompensated), output),
     }
 }

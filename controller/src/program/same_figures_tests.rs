@@ -606,7 +606,7 @@ fn check_volumetric_verification(verified: &VolumetricVerified) {
         volumetric::verified_value(verified),
     );
     let page = words(&report::html(&verified.journal).unwrap());
-    for (key, label) in [("range_um", "range "), ("limit_um", "limit ")] {
+    for (key, label) in [("range_um", "range "), ("limit_um", "tolerance ")] {
         everywhere(
             at(&json, &format!("/{key}")),
             &[(&text, label), (&page, label)],

@@ -4,6 +4,18 @@ use units::Metres;
 use units::text::length;
 
 use crate::Failure;
+use crate::program::MoveArgs;
+
+/// The targets of a move of linear axes.
+pub(crate) fn axis_targets(args: &MoveArgs) -> Result<Vec<(String, Metres)>, Failure> {
+    if args.targets.is_empty() {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
+        });
+    }
+    args.targets.iter().map(|text| axis_target(text)).collect()
+}
 
 /// `x=12.5mm`: the unit is never guessed.
 pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {

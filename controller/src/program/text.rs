@@ -56,6 +56,12 @@ pub(crate) fn figures_table(columns: &[(&str, &Figures)]) -> String {
     text + &lacks.collect::<String>()
 }
 
+/// `A = 0.276 µm, tolerance 2.000 µm: within`.
+pub(crate) fn verdict(figure: &str, tolerance: &str, is_within: bool) -> String {
+    let verdict = if is_within { "within" } else { "NOT WITHIN" };
+    format!("{figure}, tolerance {tolerance}: {verdict}")
+}
+
 /// Unidirectional ISO 230-2 figures, micrometres.
 pub(crate) fn one_way_figures(figures: &OneWayFigures) -> String {
     let (side, arrow) = match figures.approach {

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
+use machine::records::Store;
+
 use super::demo::stand::Demo;
+use super::intended::{Intent, Step};
 use super::output::{Ended, Output};
 use super::show::Shown;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::Failure;
-use crate::config::MachineConfig;
+use crate::config::{Loaded, MachineConfig};
 
 /// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {
@@ -21,6 +24,8 @@ pub(crate) struct Verbs {
     pub(crate) made_together: fn(&MachineConfig, &str) -> Option<Vec<String>>,
     /// Its demonstrations.
     pub(crate) demos: &'static [Demo],
+    /// What a verb is going to do; refuses what can be told before the machine is connected.
+    pub(crate) intended: fn(&Loaded, &Store, Intent<'_>) -> Result<Vec<Step>, Failure>,
     pub(crate) zero: fn(&AxisArgs, Output) -> Ended,
     pub(crate) calibrate: fn(&CalibrateArgs, Output) -> Ended,
     pub(crate) verify: fn(&VerifyArgs, Output) -> Ended,

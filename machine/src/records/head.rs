@@ -152,6 +152,17 @@ pub struct InstrumentRecord {
     pub dead_path_corrected: bool,
     pub cosine_corrected: bool,
     pub standard_uncertainty_m: f64,
+    /// What its readings were not corrected for although they should have been.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub switched_off: Vec<String>,
+}
+
+impl InstrumentRecord {
+    /// That corrections were switched off, in capitals; `None` where none was.
+    pub fn warning(&self) -> Option<String> {
+        (!self.switched_off.is_empty())
+            .then(|| format!("NOT CORRECTED for {}", self.switched_off.join(", ")))
+    }
 }
 
 /// The environment, SI (temperatures in °C); `None` where no sensor said.

@@ -9,6 +9,7 @@ pub(crate) mod devices;
 pub(crate) mod text;
 mod version_1;
 mod version_2;
+mod version_3;
 
 use machine::records::ConfigHash;
 
@@ -16,7 +17,11 @@ use super::model::MachineConfig;
 
 /// The hash of what a calibration depends on in `config`.
 pub(crate) fn hash_of(config: &MachineConfig) -> ConfigHash {
-    ConfigHash::of_texts(&version_2::text(config), &[version_1::text(config)])
+    let (first, second) = (version_1::text(config), version_2::text(config));
+    match version_3::text(config) {
+        None => ConfigHash::of_texts(&second, &[first]),
+        Some(third) => ConfigHash::of_texts(&third, &[second, first]),
+    }
 }
 
 #[cfg(test)]

@@ -138,6 +138,15 @@ fn the_text_is_written_as_it_was_published() {
 }
 
 #[test]
+fn the_text_of_a_missing_correction_is_written_as_it_was_published() {
+    let off = LINEAR.edit_first("correct_material = true", "correct_material = false");
+    let text = version_3::text(&parse(&off, "m").unwrap().config);
+    let published = include_str!("golden/linear-uncorrected.txt");
+    assert_eq!(text.as_deref(), Some(published));
+    assert_eq!(version_3::text(&parse(LINEAR, "m").unwrap().config), None);
+}
+
+#[test]
 fn what_is_written_out_at_its_default_changes_nothing() {
     let told = ROTARY.edit_first("node_id = 1\n", "node_id = 1\nreverse = false\n");
     assert_eq!(hash(ROTARY), hash(&told));
@@ -154,6 +163,33 @@ fn no_name_can_write_a_line() {
         text::quoted(name),
         r#""A\"\u{a}axis.\"y\".resolution_nm = 10""#
     );
+}
+
+/// Its calibrations are wrong by what is not corrected, and good ones stay good.
+#[test]
+fn a_calibration_made_without_a_correction_is_foreign_when_that_is_on_again() {
+    for key in [
+        "correct_air = true",
+        "correct_material = true",
+        "correct_dead_path = true",
+    ] {
+        // The dead path is corrected by the air that is there.
+        let off = LINEAR.edit_first(key, &key.replace("true", "false"));
+        let off = match key {
+            "correct_air = true" => {
+                off.edit_first("correct_dead_path = true", "correct_dead_path = false")
+            }
+            _ => off,
+        };
+        let (usual, off) = (hash(LINEAR), hash(&off));
+        assert!(!usual.is(off.as_str()), "{key}");
+        assert!(off.is(usual.as_str()), "{key}");
+        assert!(off.is(off.as_str()), "{key}");
+    }
+    // No beam leans by nothing.
+    assert_eq!(LINEAR.matches("correct_cosine = false").count(), 1);
+    let leans = LINEAR.edit_first("misalignment_mrad = 0.0", "misalignment_mrad = 2.0");
+    assert!(!hash(LINEAR).is(hash(&leans).as_str()));
 }
 
 /// Where a detector's module is wired, and who it is, not what the file calls it.

@@ -1,6 +1,7 @@
 //! Displacement instruments: `[instrument.NAME]`.
 
 pub(crate) mod nd287;
+mod off;
 pub(crate) mod umd2;
 
 use core::time::Duration;
@@ -15,6 +16,7 @@ use units::{Metres, Radians};
 use super::bus::{SerialLine, Wiring};
 use crate::config::judge::Judge;
 pub(crate) use nd287::Nd287Config;
+pub(crate) use off::SwitchedOff;
 pub(crate) use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
@@ -175,6 +177,11 @@ impl InstrumentConfig {
             cosine: Some(self.cosine()),
             ..self.device.family().every_correction()
         }
+    }
+
+    /// Which corrections are switched off that would change its readings.
+    pub(crate) fn switched_off(&self) -> Vec<SwitchedOff> {
+        off::switched_off(&self.corrections(), &self.every_correction())
     }
 
     fn cosine(&self) -> Cosine {

@@ -9,11 +9,11 @@ use units::{Approach, Metres};
 use crate::config::{Loaded, MachineConfig};
 use crate::correction::Correction;
 use crate::failure::Failure;
-use crate::linear::LinearContent;
 use crate::linear::course::{Corrected, Course, set_point_of, started};
 use crate::linear::job::Job;
-use crate::linear::settings;
-use crate::store::{RecordHead, Store};
+use crate::linear::settings::require_within;
+use crate::linear::stored::stored_course;
+use crate::store::Store;
 
 /// A job as it will be done.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,25 +52,14 @@ impl JobPlan {
     /// No calibration is in use, or it belongs to another machine or breaks a limit; a target or set-point outside
     /// the soft limits; a target outside the calibrated range where that is refused.
     pub fn of(job: &Job, loaded: &Loaded, store: &Store) -> Result<Self, Failure> {
-        let axis = &job.axis;
-        let id = store.active(axis)?.current;
-        let id = id.ok_or_else(|| uncalibrated(axis))?;
-        let record = store.load::<LinearContent>(&id)?;
-        let here = here(loaded, &record.head);
-        record.head.belongs_to(&id, &here, &loaded.hash)?;
-        let table = record.content.table(&id)?;
-        let compensation = settings::compensation(&loaded.config, axis, table)?;
-        let course = Course {
-            compensation: Some(compensation.clone()),
-            budget: record.content.axis_budget(&id)?,
-            approach: record.content.approach_m.map(Metres),
-            arrives_over: None,
-            zero: None,
-        };
+        let in_use = stored_course(loaded, &job.axis, store)?;
+        let (id, course) = in_use.ok_or_else(|| uncalibrated(&job.axis))?;
+        let compensation = course.compensation.as_ref();
+        let compensation = compensation.expect("a stored course has what corrects it");
         let planner = Planner {
             job,
             config: &loaded.config,
-            compensation: &compensation,
+            compensation,
             course: &course,
         };
         let points = planner.plan()?;
@@ -88,17 +77,6 @@ pub(super) fn uncalibrated(axis: &str) -> Failure {
         help: "run `truestage calibrate`, or activate a calibration with `truestage cal activate`; nothing was \
                moved"
             .into(),
-    }
-}
-
-/// Who this machine is, as far as its configuration says it.
-fn here(loaded: &Loaded, there: &RecordHead) -> RecordHead {
-    let motion = loaded.config.axis.get(&there.axis).map(|it| &it.motion);
-    RecordHead {
-        stage_serial: loaded.config.machine.stage_serial.clone(),
-        config_hash: loaded.hash.as_str().to_owned(),
-        resolution_m: motion.map(|it| it.resolution_nm * 1e-9),
-        ..there.clone()
     }
 }
 
@@ -176,18 +154,7 @@ impl Planner<'_> {
     }
 
     fn within_limits(&self, place: Metres) -> Result<(), Failure> {
-        let motion = &self.config.axis[&self.job.axis].motion;
-        let min = Metres::from_mm(motion.soft_min_mm);
-        let max = Metres::from_mm(motion.soft_max_mm);
-        if place >= min && place <= max {
-            return Ok(());
-        }
-        Err(Failure::Machine(machine::Failure::SoftLimit {
-            axis: self.job.axis.clone(),
-            target: place,
-            min,
-            max,
-        }))
+        require_within(self.config, &self.job.axis, place)
     }
 }
 

@@ -3,6 +3,7 @@
 pub(crate) mod demo;
 pub(crate) mod elsewhere;
 mod gantry;
+mod intended;
 pub(crate) mod job;
 mod moved;
 mod page;
@@ -38,6 +39,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers: |_| Vec::new(),
     made_together: |_, _| None,
     demos: demo::DEMOS,
+    intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

@@ -137,6 +137,13 @@ fn moved(axis: &str, moved: &Moved, calibration: Option<&str>) -> Told {
 pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
     let title = name.replace('_', " ");
     let mut text = text::figures_table(&[(&title, &verified.figures)]);
+    let figure = verified.figures.accuracy.bidirectional;
+    text += "\n";
+    text += &text::verdict(
+        &format!("A = {:.3} µm", figure.um()),
+        &format!("{:.3} µm", verified.tolerance.um()),
+        verified.is_within_tolerance(),
+    );
     let uncertain = uncertainty::of_targets(&verified.uncertainty);
     text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
     text += &format!(

@@ -7,13 +7,14 @@ use serde_json::{Value, json};
 use units::Metres;
 
 use crate::linear::VerifyOptions;
+use crate::linear::settings::require_within;
 use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::linear::{gantry, moved, told};
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
-use crate::program::targets::axis_target;
+use crate::program::targets::axis_targets;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::run::CalibrateOptions;
 use crate::{Agreed, Failure, Machine};
@@ -38,11 +39,8 @@ fn with_zeroed_axis<R>(
     let axis = choose_axis(session.machine.devices().axis_names(), args)?;
     let store = session.store.clone();
     let resume = journal_to_resume(resume, &store, verb, &axis)?;
-    if load_calibration && store.active(&axis)?.current.is_none() {
-        return Err(Failure::Usage {
-            what: format!("axis {axis} has no active calibration"),
-            help: "run `truestage calibrate`, or verify with --uncompensated".into(),
-        });
+    if load_calibration {
+        require_active(&store, &axis)?;
     }
     session.machine.guarded(|machine| {
         machine.start()?;
@@ -63,6 +61,17 @@ fn with_zeroed_axis<R>(
         machine.shut_down()?;
         Ok((result, to_json::counters(&machine.devices().counters())))
     })
+}
+
+/// A verification as left wants a calibration.
+pub(super) fn require_active(store: &Store, axis: &str) -> Result<(), Failure> {
+    match store.active(axis)?.current {
+        Some(_) => Ok(()),
+        None => Err(Failure::Usage {
+            what: format!("axis {axis} has no active calibration"),
+            help: "run `truestage calibrate`, or verify with --uncompensated".into(),
+        }),
+    }
 }
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
@@ -135,35 +144,11 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_way()?;
     args.without_align()?;
-    if args.targets.is_empty() {
-        return Err(Failure::Usage {
-            what: "`move` needs a target".into(),
-            help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
-        });
-    }
-    let targets = args
-        .targets
-        .iter()
-        .map(|text| axis_target(text))
-        .collect::<Result<Vec<_>, _>>()?;
+    let targets = axis_targets(args)?;
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let agreed = args.agreed.agreed();
     for (axis, target) in &targets {
-        let (min, max) = {
-            let config = session.machine.linear(axis)?.config();
-            (
-                Metres::from_mm(config.motion.soft_min_mm),
-                Metres::from_mm(config.motion.soft_max_mm),
-            )
-        };
-        if !(*target >= min && *target <= max) {
-            return Err(Failure::Machine(machine::Failure::SoftLimit {
-                axis: axis.clone(),
-                target: *target,
-                min,
-                max,
-            }));
-        }
+        require_within(session.machine.config(), axis, *target)?;
     }
     let store = session.store.clone();
     let moved = session.machine.guarded(|machine| {

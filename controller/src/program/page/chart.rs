@@ -6,12 +6,19 @@ use super::escape;
 use super::svg::{Axes, BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, grid, padded};
 
 /// Colours that are told apart also without red and green.
-pub(crate) const BLUE: &str = "#0b66c3";
-pub(crate) const ORANGE: &str = "#c2410c";
-pub(crate) const GREEN: &str = "#4d7c0f";
+pub(crate) const BLUE: &str = "var(--first)";
+pub(crate) const ORANGE: &str = "var(--second)";
+pub(crate) const GREEN: &str = "var(--third)";
 
 /// For series that have no colour of their own.
-pub(crate) const COLOURS: [&str; 6] = [BLUE, ORANGE, GREEN, "#7e22ce", "#0f766e", "#475569"];
+pub(crate) const COLOURS: [&str; 6] = [
+    BLUE,
+    ORANGE,
+    GREEN,
+    "var(--fourth)",
+    "var(--fifth)",
+    "var(--sixth)",
+];
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +73,7 @@ pub(crate) fn drawn(
         let (y, right) = (axes.py(limit), WIDTH - RIGHT);
         let _ = write!(
             svg,
-            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\" stroke=\"#b91c1c\" \
+            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\" stroke=\"var(--limit)\" \
              stroke-dasharray=\"6 4\"/>"
         );
     }
@@ -182,7 +189,7 @@ pub(crate) fn map(title: &str, unit: &str, arrows_unit: &str, arrows: &[Arrow]) 
     svg += &arrow((x, y), (sample * arrow_scale, 0.0));
     let _ = write!(
         svg,
-        "<text x=\"{x:.1}\" y=\"{:.1}\" font-size=\"12\" fill=\"#566\">{sample} {}</text></svg>",
+        "<text x=\"{x:.1}\" y=\"{:.1}\" font-size=\"12\" fill=\"var(--quiet)\">{sample} {}</text></svg>",
         y + 20.0,
         escape(arrows_unit)
     );
@@ -193,10 +200,10 @@ pub(crate) fn cross((x, y): (f64, f64), half: f64, reach: f64, unit: &str) -> St
     let (left, right, top, bottom) = (x - half, x + half, y - half, y + half);
     let unit = escape(unit);
     format!(
-        "<g stroke=\"#e4e9ef\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{0:.1}\" \
+        "<g stroke=\"var(--grid)\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{0:.1}\" \
          height=\"{0:.1}\" fill=\"none\"/><line x1=\"{left:.1}\" x2=\"{right:.1}\" y1=\"{y:.1}\" \
          y2=\"{y:.1}\"/><line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{top:.1}\" \
-         y2=\"{bottom:.1}\"/></g><g font-size=\"12\" fill=\"#566\"><text x=\"{left:.1}\" \
+         y2=\"{bottom:.1}\"/></g><g font-size=\"12\" fill=\"var(--quiet)\"><text x=\"{left:.1}\" \
          y=\"{1:.1}\">x from {2:.2} to {reach:.2} {unit}, the same for y</text></g>",
         2.0 * half,
         bottom + 18.0,

@@ -8,16 +8,30 @@ use core::fmt::Write as _;
 
 use machine::records::{IdentityRecord, ReadJournal};
 
+/// By the reader's own scheme on a screen, dark on light on paper. Colours of pictures are named here, too: a
+/// picture in the page takes them from it.
 pub(crate) const STYLE: &str = "\
+:root{color-scheme:light dark;--ink:#1c2430;--paper:#fff;--quiet:#566;--rule:#dde3ea;--grid:#e4e9ef;--zero:#8794a3;\
+--limit:#b91c1c;--warning:#b00020;--first:#0b66c3;--second:#c2410c;--third:#4d7c0f;--fourth:#7e22ce;--fifth:#0f766e;\
+--sixth:#475569}\
+@media screen and (prefers-color-scheme:dark){:root{--ink:#e4e8ee;--paper:#12161c;--quiet:#9aa7b5;--rule:#2c3540;\
+--grid:#242c36;--zero:#6b7887;--limit:#f87171;--warning:#ff8a80;--first:#60a5fa;--second:#fb923c;--third:#a3d154;\
+--fourth:#c084fc;--fifth:#2dd4bf;--sixth:#a8b3c2}}\
 body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;\
-color:#1c2430;background:#fff}h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2.2rem}\
+color:var(--ink);background:var(--paper)}h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2.2rem}\
 h3{font-size:1rem}\
 table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .8rem;text-align:right;\
-border-bottom:1px solid #dde3ea}th{color:#566}td:first-child,th:first-child{text-align:left}\
-svg{width:100%;height:auto}.note{color:#566}figure{margin:0}";
+border-bottom:1px solid var(--rule)}th{color:var(--quiet)}td:first-child,th:first-child{text-align:left}\
+svg{width:100%;height:auto}figure{margin:0}.note{color:var(--quiet)}\
+.warning *{color:var(--warning);font-weight:600}\
+@media print{:root{color-scheme:light}body{max-width:none;margin:0;padding:0;font-size:11px}\
+figure,svg,tr{break-inside:avoid}h2,h3{break-after:avoid}}";
 
 /// The fact that names the calibration in use.
 pub(crate) const IN_USE: &str = "calibration in use";
+
+/// The fact that nobody may overlook: it is red.
+const WARNING: &str = "warning";
 
 /// A whole page around `body`; `note` says how to read it.
 pub(crate) fn document(title: &str, body: &str, note: &str) -> String {
@@ -26,7 +40,8 @@ pub(crate) fn document(title: &str, body: &str, note: &str) -> String {
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\
          <style>{STYLE}</style></head><body><h1>{title}</h1>{body}\
-         <p class=\"note\">{note} Made by truestage; not a certificate.</p></body></html>\n"
+         <p class=\"note\">{note} Made by truestage {}; not a certificate.</p></body></html>\n",
+        env!("CARGO_PKG_VERSION")
     )
 }
 
@@ -47,6 +62,7 @@ pub(crate) fn facts_of<L>(journal: &ReadJournal<L>, points: usize) -> Vec<(Strin
             IN_USE.to_owned(),
             header.calibration.clone().unwrap_or("none".into()),
         ),
+        ("configuration".to_owned(), header.config_hash.clone()),
         ("points".to_owned(), points.to_string()),
         (
             "complete".to_owned(),
@@ -85,16 +101,22 @@ pub(crate) fn facts_of<L>(journal: &ReadJournal<L>, points: usize) -> Vec<(Strin
         };
         let value = format!("{} ({}), corrected for {corrected}", it.name, it.identity);
         facts.push(("instrument".to_owned(), value));
+        if let Some(warning) = it.warning() {
+            facts.push((WARNING.to_owned(), format!("its readings were {warning}")));
+        }
     }
     facts
 }
 
 pub(crate) fn facts(facts: &[(String, String)]) -> String {
     let rows = facts.iter().fold(String::new(), |mut rows, (name, value)| {
-        let value = escape(value);
+        let (class, value) = (
+            if name == WARNING { WARNING } else { "fact" },
+            escape(value),
+        );
         let _ = write!(
             rows,
-            "<tr><th>{}</th><td style=\"text-align:left\">{value}</td></tr>",
+            "<tr class=\"{class}\"><th>{}</th><td style=\"text-align:left\">{value}</td></tr>",
             escape(name)
         );
         rows

@@ -8,8 +8,8 @@ pub(crate) const LEFT: f64 = 64.0;
 pub(crate) const RIGHT: f64 = 20.0;
 pub(crate) const TOP: f64 = 24.0;
 pub(crate) const BOTTOM: f64 = 44.0;
-pub(crate) const FORWARD: &str = "#0b66c3";
-pub(crate) const REVERSE: &str = "#c2410c";
+pub(crate) const FORWARD: &str = "var(--first)";
+pub(crate) const REVERSE: &str = "var(--second)";
 
 /// From data to the page.
 pub(crate) struct Axes {
@@ -74,15 +74,15 @@ pub(crate) fn label(value: f64, step: f64) -> String {
 
 /// Lines, numbers, and what both axes are.
 pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
-    let mut svg = String::from("<g font-size=\"12\" fill=\"#566\" stroke-width=\"1\">");
+    let mut svg = String::from("<g font-size=\"12\" fill=\"var(--quiet)\" stroke-width=\"1\">");
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     let y_step = step(axes.y.1 - axes.y.0, 6.0);
     for y in ticks(axes.y, 6.0) {
         let py = axes.py(y);
         let colour = if y.abs() < y_step * 1e-6 {
-            "#8794a3"
+            "var(--zero)"
         } else {
-            "#e4e9ef"
+            "var(--grid)"
         };
         let _ = write!(
             svg,

@@ -2,6 +2,7 @@
 
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod intended;
 mod json;
 pub(crate) mod plan;
 mod report;
@@ -29,6 +30,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers: |_| Vec::new(),
     made_together: screws_of,
     demos: demo::DEMOS,
+    intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

@@ -11,6 +11,7 @@ use crate::program::output::{Ended, Output};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::platform::target::NamedPose;
 use crate::program::session::Session;
+use crate::program::text::verdict;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::{Failure, Machine};
 use machine::records::Store;
@@ -135,7 +136,8 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let named = NamedPose::parse(&args.targets)?;
     let mut session = Session::open(&args.machine, "move", Use::Measurement, output)?;
     let compensated = !args.agreed.uncompensated;
-    refuse_impossible(&mut session, named, (args.align, compensated))?;
+    let machine = (&mut session.machine, &session.store);
+    refuse_impossible(machine, named, (args.align, compensated))?;
     let look = |machine: &mut Machine| match named.unnamed().is_empty() {
         true => Ok(None),
         false => machine.platform()?.look().map(Some),
@@ -168,12 +170,11 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 }
 
 /// What can be told before anything is sent. Where it stands, what is not named is judged after the zero.
-fn refuse_impossible(
-    session: &mut Session,
+pub(super) fn refuse_impossible(
+    (machine, store): (&mut Machine, &Store),
     named: NamedPose,
     (align, compensated): (bool, bool),
 ) -> Result<(), Failure> {
-    let (machine, store) = (&mut session.machine, &session.store);
     machine
         .platform()?
         .check_pose(named.from(Pose::default()))?;
@@ -351,13 +352,15 @@ pub(crate) fn verified_text(title: &str, verified: &PlatformVerified) -> String 
     let skew = verified.skew_max_s.map_or(String::new(), |it| {
         format!("; screws started within {:.3} ms", it * 1e3)
     });
+    let verdict = verdict(
+        &format!("{title}: largest error {:.3} µm", verified.largest.um()),
+        &format!("{:.3} µm", verified.tolerance.um()),
+        verified.is_within_tolerance(),
+    );
     format!(
-        "{title}: largest error {:.3} µm, rms {:.3} µm over {} poses (tolerance {:.3} µm){skew}\n\
-         poses in {}",
-        verified.largest.um(),
+        "{verdict}\nrms {:.3} µm over {} poses{skew}\nposes in {}",
         verified.rms.um(),
         verified.poses.len(),
-        verified.tolerance.um(),
         verified.journal.display()
     )
 }

@@ -2,12 +2,14 @@
 
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod intended;
 mod json;
 pub(crate) mod readings;
 mod report;
 mod residuals;
 #[cfg(test)]
 mod stored_tests;
+mod targets;
 pub(crate) mod told;
 pub(crate) mod verbs;
 
@@ -35,6 +37,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers: |_| Vec::new(),
     made_together: |_, _| None,
     demos: demo::DEMOS,
+    intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

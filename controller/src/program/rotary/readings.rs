@@ -157,7 +157,7 @@ impl Desk {
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let files = args.readings.files()?;
-    let mut person = reader(&files, args.yes, &args.axis, output)?;
+    let mut person = reader(&files, args.ask.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "calibrate")?;
     let (axis, store) = (desk.axis.as_str(), &desk.store);
     let options = CalibrateOptions {
@@ -180,7 +180,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let files = args.readings.files()?;
-    let mut person = reader(&files, args.yes, &args.axis, output)?;
+    let mut person = reader(&files, args.ask.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "verify")?;
     let (axis, store) = (desk.axis.as_str(), &desk.store);
     let resume = journal_to_resume(args.resume.as_ref(), store, "verify", axis)?;

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use crate::Failure;
 use crate::program::output::{Ended, Output};
 use crate::program::rotary::json::{arcsec, solution};
+use crate::program::text::verdict;
 use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
 
@@ -104,10 +105,11 @@ pub(crate) fn verified_text(verified: &RotaryVerified) -> String {
     };
     let mut text = figures_text("as found", &verified.found) + whose;
     if let Some(left) = &verified.left {
-        text += &format!(
-            "\n{} (tolerance {:.3}″)",
-            figures_text("as left", left),
-            verified.tolerance.arcsec()
+        text += "\n";
+        text += &verdict(
+            &figures_text("as left", left),
+            &format!("{:.3}″", verified.tolerance.arcsec()),
+            verified.is_within_tolerance(),
         );
     }
     if let Some(noise) = verified.noise {

@@ -2,7 +2,6 @@
 
 use machine::records::short;
 use serde_json::{Value, json};
-use units::Radians;
 
 use crate::ports::Use;
 use crate::program::json as to_json;
@@ -11,15 +10,14 @@ use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::rotary::json::arcsec;
 use crate::program::rotary::readings::{self, ReadBy};
+use crate::program::rotary::targets::{named_way, targets, turns_left_out};
 use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
 use crate::program::session::{Session, choose_axis};
-use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs, WayName};
-use crate::rotary::Way;
+use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::rotary::moves::RotaryMoved;
 use crate::run::CalibrateOptions;
 use crate::{Failure, Machine};
 use machine::records::Store;
-use units::text::angle;
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let run = |_: &mut Machine, _: &str, _: &Store| Ok(());
@@ -59,10 +57,12 @@ enum Reader {
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let mut operator = match ReadBy::of(&args.axis, &args.readings)? {
-        ReadBy::Detector => {
-            Reader::Detector(Terminal::new(args.yes, args.axis.machine.hand(), output)?)
-        }
-        ReadBy::Driven => Reader::Person(readings::person(args.yes, &args.axis, output, true)?),
+        ReadBy::Detector => Reader::Detector(Terminal::new(
+            args.ask.yes,
+            args.axis.machine.hand(),
+            output,
+        )?),
+        ReadBy::Driven => Reader::Person(readings::person(args.ask.yes, &args.axis, output, true)?),
         ReadBy::Alone => return readings::calibrate(args, output),
     };
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
@@ -97,10 +97,12 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
                 help: "it is one placement: start it again".into(),
             });
         }
-        ReadBy::Detector => {
-            Reader::Detector(Terminal::new(args.yes, args.axis.machine.hand(), output)?)
-        }
-        ReadBy::Driven => Reader::Person(readings::person(args.yes, &args.axis, output, true)?),
+        ReadBy::Detector => Reader::Detector(Terminal::new(
+            args.ask.yes,
+            args.axis.machine.hand(),
+            output,
+        )?),
+        ReadBy::Driven => Reader::Person(readings::person(args.ask.yes, &args.axis, output, true)?),
         ReadBy::Alone => return readings::verify(args, output),
     };
     let compensated = !args.uncompensated;
@@ -126,23 +128,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     args.without_beyond()?;
     args.without_align()?;
-    let targets: Vec<_> = args
-        .targets
-        .iter()
-        .map(|text| target(text))
-        .collect::<Result<_, _>>()?;
-    if targets.is_empty() {
-        return Err(Failure::Usage {
-            what: "`move` needs a target".into(),
-            help: "write AXIS=ANGLE with a unit: c=90deg".into(),
-        });
-    }
-    let way = match args.way {
-        None | Some(WayName::Shortest) => Way::Shortest,
-        Some(WayName::Forward) => Way::Forward,
-        Some(WayName::Reverse) => Way::Reverse,
-        Some(WayName::Turns) => Way::Turns,
-    };
+    let (targets, way) = (targets(args)?, named_way(args));
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let store = session.store.clone();
     let uncompensated = args.agreed.uncompensated;
@@ -156,18 +142,23 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         for ((axis, angle), calibration) in targets.iter().zip(calibrations) {
             machine.rotary(axis)?.zero()?;
             let turned = machine.rotary(axis)?.move_to(*angle, way)?;
-            moved.push((axis, turned, calibration));
+            moved.push((axis, turned, calibration, turns_left_out(*angle, way)));
         }
         machine.shut_down()?;
         Ok(moved)
     })?;
     let lines: Vec<_> = moved
         .iter()
-        .map(|(axis, moved, calibration)| moved_text(axis, moved, calibration.as_deref()))
+        .map(|(axis, moved, calibration, note)| {
+            let note = note
+                .as_ref()
+                .map_or(String::new(), |it| format!("\naxis {axis}: {it}"));
+            moved_text(axis, moved, calibration.as_deref()) + &note
+        })
         .collect();
     let values: Vec<_> = moved
         .iter()
-        .map(|(axis, moved, calibration)| moved_value(axis, moved, calibration.as_deref()))
+        .map(|(axis, moved, calibration, _)| moved_value(axis, moved, calibration.as_deref()))
         .collect();
     output.result(&lines.join("\n"), &json!({"moves": values}))
 }
@@ -184,9 +175,7 @@ fn calibration_of(
         return Ok(None);
     }
     let id = machine.rotary(axis)?.load_active(store)?;
-    id.map(Some).ok_or_else(|| Failure::NotCalibrated {
-        what: format!("axis {axis} has no calibration"),
-    })
+    id.map(Some).ok_or_else(|| Failure::not_calibrated(axis))
 }
 
 pub(crate) fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
@@ -223,41 +212,4 @@ pub(crate) fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&
         "calibration": calibration,
         "corrected": calibration.is_some(),
     })
-}
-
-/// `c=90deg`: the unit is never guessed.
-fn target(text: &str) -> Result<(String, Radians), Failure> {
-    let parsed = text.split_once('=').and_then(|(axis, value)| {
-        let named = (!axis.is_empty()).then(|| axis.to_owned());
-        Some((named?, angle(value)?))
-    });
-    parsed.ok_or_else(|| Failure::Usage {
-        what: format!("`{text}` is not a target"),
-        help: "write AXIS=ANGLE with a unit: c=90deg, c=-30arcmin, c=20arcsec, c=1.5rad".into(),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_target_is_an_axis_and_an_angle_with_its_unit() {
-        for (text, degrees) in [
-            ("c=90deg", 90.0),
-            ("c=-30arcmin", -0.5),
-            ("c=36arcsec", 0.01),
-            ("c=1e3mrad", 57.295_779_513_082_32),
-            ("c=-725.5deg", -725.5),
-        ] {
-            let (axis, angle) = target(text).unwrap();
-            assert_eq!(axis, "c");
-            assert!((angle.degrees() - degrees).abs() < 1e-9, "{text}");
-        }
-        for text in [
-            "c=90", "c", "=1deg", "c=1mm", "c=nandeg", "c=infrad", "c=1,5deg",
-        ] {
-            assert!(target(text).is_err(), "{text}");
-        }
-    }
 }

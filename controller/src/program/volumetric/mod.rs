@@ -2,6 +2,7 @@
 
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod intended;
 pub(crate) mod part;
 pub(crate) mod reference;
 mod report;
@@ -30,6 +31,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers,
     made_together: |_, _| None,
     demos: demo::DEMOS,
+    intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,
     verify: verbs::verify,

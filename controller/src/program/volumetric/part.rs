@@ -12,6 +12,7 @@ use units::Metres;
 use crate::config;
 use crate::ports::Use;
 use crate::program::data_file::{read, volume_head_of};
+use crate::program::intended::nowhere;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::verbs::{never_measured, with_zeroed_volume, zeroed_volume};
@@ -95,6 +96,25 @@ pub(crate) fn run(
         value["memory"] = kept_value(kept);
     }
     output.result(&text, &value)
+}
+
+/// Says what would be driven; nothing is connected.
+pub(crate) fn only_judged(
+    args: &MachineArgs,
+    file: &Path,
+    is_corrected: bool,
+    output: Output,
+) -> Ended {
+    let text = read(file)?;
+    let loaded = config::load(&args.config)?;
+    let store = loaded.config.machine.store();
+    if is_corrected && store.active(GEOMETRY)?.current.is_none() {
+        return Err(never_measured());
+    }
+    let path = judged(&mut nowhere::machine(&loaded), (file, &text), is_corrected)?;
+    let value = json!({"dry_run": true, "points": path.points.len(),
+                       "largest_departure": departure_value(&path.departure)});
+    output.result(&before_it_moves(file, &path), &value)
 }
 
 /// What is driven, for whoever may still stop it: rows that turn a corner are not joined straight.

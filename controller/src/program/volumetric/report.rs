@@ -12,6 +12,7 @@ use units::{Metres, Radians};
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts};
+use crate::program::text::verdict;
 use crate::program::volumetric::shown;
 use crate::volumetric::verify::from_the_first;
 use crate::volumetric::{
@@ -216,12 +217,16 @@ fn verification(journal: &ReadJournal<VolumeLog>) -> String {
         band("", BLUE, &sure, factor),
         line("deviation", BLUE, points),
     ];
+    let verdict = verdict(
+        &format!("range {range:.3} µm"),
+        &format!("{:.3} µm", um(check.limit_m)),
+        range <= um(check.limit_m),
+    );
     let mut html = format!(
-        "<h2>Line {}</h2><p>From {} to {} mm: range {range:.3} µm, limit {:.3} µm.</p>",
+        "<h2>Line {}</h2><p>From {} to {} mm: {verdict}.</p>",
         escape(&check.state),
         place(check.from_m),
         place(check.to_m),
-        um(check.limit_m),
     );
     html += &section("Deviation along the line", ALONG, &series);
     html += &said(factor);

@@ -17,6 +17,7 @@ use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
+use crate::program::text::verdict;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::UnknownRecord;
 use crate::volumetric::verify::VolumetricVerified;
@@ -95,7 +96,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             });
         }
     };
-    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
+    let mut operator = Terminal::new(args.ask.yes, args.axis.machine.hand(), output)?;
     let ready = |_: &mut Machine, store: &Store| {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
     };
@@ -210,7 +211,7 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
             help: "it is one line: start it again".into(),
         });
     }
-    let mut operator = Terminal::new(args.yes, args.axis.machine.hand(), output)?;
+    let mut operator = Terminal::new(args.ask.yes, args.axis.machine.hand(), output)?;
     let by = match args.uncompensated {
         true => VerifyBy::AsFound,
         false => VerifyBy::Everything,
@@ -240,12 +241,15 @@ pub(crate) fn out_of_tolerance(verified: &VolumetricVerified) -> Failure {
 }
 
 pub(crate) fn verified_text(verified: &VolumetricVerified) -> String {
-    let head = format!(
-        "deviations along the line: range {:.3} µm, limit {:.3} µm\n        x        y        z (mm)  \
-         deviation (µm)   u (µm)",
-        verified.range.um(),
-        verified.limit.um()
+    let verdict = verdict(
+        &format!(
+            "deviations along the line: range {:.3} µm",
+            verified.range.um()
+        ),
+        &format!("{:.3} µm", verified.limit.um()),
+        verified.is_within_tolerance(),
     );
+    let head = format!("{verdict}\n        x        y        z (mm)  deviation (µm)   u (µm)");
     verified.points.iter().fold(head, |text, it| {
         let [x, y, z] = mm(it.at);
         text + &format!(
@@ -263,6 +267,7 @@ pub(crate) fn verified_value(verified: &VolumetricVerified) -> Value {
     json!({
         "range_um": verified.range.um(),
         "limit_um": verified.limit.um(),
+        "within_tolerance": verified.is_within_tolerance(),
         "journal": verified.journal,
         "points": points.collect::<Vec<_>>(),
     })
@@ -272,11 +277,19 @@ fn mm(point: Point) -> [f64; 3] {
     Axis::ALL.map(|axis| point.along(axis).mm())
 }
 
-/// Where the axes that are not named stay: where the zero left them.
-pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    args.without_way()?;
-    args.without_beyond()?;
-    args.without_align()?;
+/// Where some of the three axes are told to go.
+pub(super) struct NamedPoint([Option<Metres>; 3]);
+
+impl NamedPoint {
+    /// The whole point: the axes that are not named stay at `rest`, where the zero leaves them.
+    pub(super) fn from(&self, rest: [Metres; 3]) -> Point {
+        let at = |k: usize| self.0[k].unwrap_or(rest[k]);
+        Point::new(at(0), at(1), at(2))
+    }
+}
+
+/// The targets of a move of three axes.
+pub(super) fn targets(args: &MoveArgs) -> Result<NamedPoint, Failure> {
     let mut target: [Option<Metres>; 3] = [None; 3];
     for text in &args.targets {
         let (axis, place) = axis_target(text)?;
@@ -294,21 +307,36 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
             help: "write AXIS=PLACE with a unit: x=12.5mm y=20mm z=5mm".into(),
         });
     }
+    Ok(NamedPoint(target))
+}
+
+/// Whether the axes may go to `target`; the correction reaches no farther than the volume.
+pub(super) fn refuse_unreachable(
+    machine: &mut Machine,
+    target: Point,
+    is_corrected: bool,
+) -> Result<(), Failure> {
+    let mut mover = machine.volumetric()?.uncorrected_mover()?;
+    mover.check_target(target)?;
+    if is_corrected {
+        machine.volumetric()?.check(target)?;
+    }
+    Ok(())
+}
+
+pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
+    args.without_way()?;
+    args.without_beyond()?;
+    args.without_align()?;
+    let named = targets(args)?;
     let ready = |machine: &mut Machine, store: &Store| {
         let index_mm = machine.volumetric()?.config().zero.index_mm;
-        let at = |k: usize| target[k].unwrap_or(Metres::from_mm(index_mm[k]));
-        let target = Point::new(at(0), at(1), at(2));
+        let target = named.from(index_mm.map(Metres::from_mm));
         let mover = match args.agreed.uncompensated {
             true => None,
             false => Some(stored_mover(machine, store)?),
         };
-        machine
-            .volumetric()?
-            .uncorrected_mover()?
-            .check_target(target)?;
-        if mover.is_some() {
-            machine.volumetric()?.check(target)?;
-        }
+        refuse_unreachable(machine, target, mover.is_some())?;
         Ok((mover, target))
     };
     let run = |machine: &mut Machine, _: &Store, (mover, target): (Option<Mover>, Point)| {

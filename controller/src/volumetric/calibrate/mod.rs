@@ -24,7 +24,7 @@ mod gross;
 mod known;
 mod off;
 mod own;
-mod plan;
+pub(crate) mod plan;
 mod readings;
 mod resume;
 mod scatter;
@@ -174,7 +174,7 @@ impl WorkVolume<'_> {
             // It is brought along: who it is shows when it is switched on.
             instrument: InstrumentRecord {
                 identity: String::new(),
-                ..self.core.instrument_record(instrument)
+                ..of_lines(self.core.instrument_record(instrument))
             },
             started: utc_now(),
             calibration,
@@ -311,7 +311,7 @@ impl WorkVolume<'_> {
         let head = RecordHead {
             created: utc_now(),
             source: source.clone(),
-            instrument: self.core.instrument_record(&session.own.instrument),
+            instrument: of_lines(self.core.instrument_record(&session.own.instrument)),
             ..self.this_volume(GEOMETRY)?
         };
         let content = evaluated.content(&session.config);
@@ -333,6 +333,16 @@ impl WorkVolume<'_> {
 }
 
 /// Has these lines read again when the run is continued.
+/// What measures lines reads the machine as warm as it is: nothing is missing where nothing is reckoned back to 20 °C.
+fn of_lines(instrument: InstrumentRecord) -> InstrumentRecord {
+    let mut switched_off = instrument.switched_off;
+    switched_off.retain(|it| it != "material");
+    InstrumentRecord {
+        switched_off,
+        ..instrument
+    }
+}
+
 fn void_lines(lines: &[usize], journal: &mut Journal<VolumeLog>) -> Result<(), Failure> {
     for line in lines.iter().copied() {
         journal.write(&VolumeEntry::LineVoid(LineVoidEntry { line }))?;

@@ -1,0 +1,105 @@
+//! What is said before anything moves: on a terminal it is shown and asked for, with `--dry-run` it is all that happens.
+
+use std::io::{BufRead, IsTerminal, stderr, stdin};
+
+use machine::records::{Lease, short};
+use serde_json::{Value, json};
+
+use crate::Failure;
+use crate::config::{self, Loaded};
+use crate::program::intended::{Intent, Step};
+use crate::program::kept::{self, Service};
+use crate::program::kind::by_kind;
+use crate::program::output::{Ended, Output};
+use crate::program::verbs::Verbs;
+
+/// Does what is intended, once it has been said what that is and nobody has objected: here, or by the service that
+/// keeps the machine.
+pub(crate) fn run(intent: Intent<'_>, output: Output) -> Ended {
+    let ended = by_kind(intent.machine(), intent.named().into_iter(), |kind| {
+        let ask = intent.ask();
+        if ask.dry_run {
+            let loaded = config::load(&intent.machine().config)?;
+            let steps = steps(kind, &loaded, intent)?;
+            return output.result(&told(&loaded, &steps), &value(&loaded, &steps));
+        }
+        if !ask.yes && stdin().is_terminal() && stderr().is_terminal() {
+            let loaded = config::load(&intent.machine().config)?;
+            output.note(&told(&loaded, &steps(kind, &loaded, intent)?));
+            if is_kept(&loaded) {
+                output
+                    .note("  a service keeps this machine: what has its zero is not zeroed again");
+            }
+            agreed_to(output)?;
+        }
+        here(intent, kind, output)
+    });
+    kept::or_by_its_service(ended, |service| there(intent, service, output))
+}
+
+/// Whether another program has the machine.
+fn is_kept(loaded: &Loaded) -> bool {
+    Lease::take(&loaded.config.machine.store(), "ask").is_err()
+}
+
+fn steps(kind: &Verbs, loaded: &Loaded, intent: Intent<'_>) -> Result<Vec<Step>, Failure> {
+    (kind.intended)(loaded, &loaded.config.machine.store(), intent)
+}
+
+fn told(loaded: &Loaded, steps: &[Step]) -> String {
+    let machine = &loaded.config.machine;
+    let first = format!(
+        "machine {}, stage {}, configuration {}",
+        machine.name,
+        machine.stage_serial,
+        short(loaded.hash.as_str())
+    );
+    let lines = steps.iter().map(Step::line);
+    lines.fold(first, |text, line| format!("{text}\n  {line}"))
+}
+
+fn value(loaded: &Loaded, steps: &[Step]) -> Value {
+    let machine = &loaded.config.machine;
+    json!({
+        "dry_run": true,
+        "machine": machine.name,
+        "stage_serial": machine.stage_serial,
+        "hash": loaded.hash.as_str(),
+        "steps": steps.iter().map(Step::value).collect::<Vec<_>>(),
+    })
+}
+
+/// Waits for a yes.
+fn agreed_to(output: Output) -> Result<(), Failure> {
+    output.note("go on? y and Enter; anything else leaves everything where it is");
+    let mut answer = String::new();
+    let read = stdin().lock().read_line(&mut answer);
+    let is_yes = matches!(answer.trim(), "y" | "Y" | "yes");
+    if read.is_ok() && is_yes {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "nobody agreed to that; nothing was moved".into(),
+        help:
+            "answer y, or write --yes to be asked nothing; --dry-run only says what would be done"
+                .into(),
+    })
+}
+
+fn here(intent: Intent<'_>, kind: &Verbs, output: Output) -> Ended {
+    match intent {
+        Intent::Zero(args) => (kind.zero)(&args.axis, output),
+        Intent::Calibrate(args) => (kind.calibrate)(args, output),
+        Intent::Verify(args) => (kind.verify)(args, output),
+        Intent::Move(args) => (kind.move_to)(args, output),
+    }
+}
+
+fn there(intent: Intent<'_>, service: &Service, output: Output) -> Ended {
+    match intent {
+        Intent::Zero(args) => service.zero(&args.axis, output),
+        Intent::Calibrate(args) => service.calibrate(args, output),
+        Intent::Verify(args) => service.verify(args, output),
+        Intent::Move(args) => service.move_to(args, output),
+    }
+}

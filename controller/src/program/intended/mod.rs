@@ -1,0 +1,116 @@
+//! What a verb is going to do.
+
+mod ago;
+pub(crate) mod nowhere;
+
+use machine::records::{Store, short};
+use serde_json::{Value, json};
+
+use crate::Failure;
+use crate::program::{
+    AskArgs, AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs, ZeroArgs,
+};
+
+/// A verb and its words.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Intent<'a> {
+    Zero(&'a ZeroArgs),
+    Calibrate(&'a CalibrateArgs),
+    Verify(&'a VerifyArgs),
+    Move(&'a MoveArgs),
+}
+
+impl<'a> Intent<'a> {
+    pub(crate) const fn machine(self) -> &'a MachineArgs {
+        match self {
+            Self::Zero(args) => &args.axis.machine,
+            Self::Calibrate(args) => &args.axis.machine,
+            Self::Verify(args) => &args.axis.machine,
+            Self::Move(args) => &args.machine,
+        }
+    }
+
+    pub(crate) const fn ask(self) -> AskArgs {
+        match self {
+            Self::Zero(args) => args.ask,
+            Self::Calibrate(args) => args.ask,
+            Self::Verify(args) => args.ask,
+            Self::Move(args) => args.ask,
+        }
+    }
+
+    /// The axes that it names.
+    pub(crate) fn named(self) -> Vec<&'a str> {
+        let one = |args: &'a AxisArgs| args.axis.as_deref().into_iter().collect();
+        match self {
+            Self::Zero(args) => one(&args.axis),
+            Self::Calibrate(args) => one(&args.axis),
+            Self::Verify(args) => one(&args.axis),
+            Self::Move(args) => args.named().collect(),
+        }
+    }
+
+    /// Whether what it moves goes without its calibration on purpose.
+    pub(crate) const fn is_uncompensated(self) -> bool {
+        match self {
+            Self::Zero(_) | Self::Calibrate(_) => false,
+            Self::Verify(args) => args.uncompensated,
+            Self::Move(args) => args.agreed.uncompensated,
+        }
+    }
+}
+
+/// One thing that is going to happen, or that it depends upon.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    /// `zero`, `calibration`, `calibrate`, `verify` or `move`.
+    what: &'static str,
+    /// Whose: an axis, or all of them by what they are.
+    whose: String,
+    text: String,
+}
+
+impl Step {
+    pub(crate) fn new(what: &'static str, whose: &str, text: String) -> Self {
+        Self {
+            what,
+            whose: whose.to_owned(),
+            text,
+        }
+    }
+
+    /// For people.
+    pub(crate) fn line(&self) -> String {
+        format!("{}: {}: {}", self.whose, self.what, self.text)
+    }
+
+    /// For programs.
+    pub(crate) fn value(&self) -> Value {
+        json!({"what": self.what, "whose": self.whose, "text": self.text})
+    }
+}
+
+/// What corrects `whose` moves: what `store` says is in use under `pointer`.
+pub(crate) fn calibration(
+    store: &Store,
+    (whose, pointer): (&str, &str),
+    intent: Intent<'_>,
+) -> Result<Step, Failure> {
+    let current = store.active(pointer)?.current;
+    let by = match &current {
+        None => "no calibration".to_owned(),
+        Some(id) => {
+            let created = store.glance(id)?.head.created;
+            let ago = ago::since(&created).map_or(String::new(), |it| format!(", {it}"));
+            format!("calibration {} of {created}{ago}", short(id))
+        }
+    };
+    let text = match (intent, current) {
+        _ if intent.is_uncompensated() => "NOT CORRECTED: --uncompensated".to_owned(),
+        (Intent::Calibrate(_), None) => "none is in use".into(),
+        (Intent::Calibrate(_), Some(_)) => format!("{by} stays in use until then"),
+        (_, None) => format!("NOT CORRECTED: {by} is in use"),
+        (_, Some(_)) => format!("corrected by {by}"),
+    };
+    Ok(Step::new("calibration", whose, text))
+}

@@ -1,0 +1,149 @@
+//! What a verb is going to do with linear axes.
+
+use machine::Stage;
+use machine::records::Store;
+use units::{Metres, Several, Short, ShortSpan};
+
+use crate::Failure;
+use crate::config::{AxisConfig, Loaded};
+use crate::linear::Corrected;
+use crate::linear::settings::require_within;
+use crate::linear::stored::stored_course;
+use crate::linear::verify::{plan_of, speed_of};
+use crate::program::AxisArgs;
+use crate::program::intended::{Intent, Step, calibration};
+use crate::program::linear::gantry;
+use crate::program::linear::moved::warning_of;
+use crate::program::linear::verbs::require_active;
+use crate::program::session::choose_axis;
+use crate::program::targets::axis_targets;
+
+pub(crate) fn intended(
+    loaded: &Loaded,
+    store: &Store,
+    intent: Intent<'_>,
+) -> Result<Vec<Step>, Failure> {
+    match intent {
+        Intent::Zero(args) => zeroed(loaded, &args.axis),
+        Intent::Calibrate(args) => measured(loaded, store, intent, (&args.axis, Stage::Calibrate)),
+        Intent::Verify(args) => measured(loaded, store, intent, (&args.axis, Stage::Verify)),
+        Intent::Move(args) => {
+            let mut steps = Vec::new();
+            for (axis, target) in axis_targets(args)? {
+                require_within(&loaded.config, &axis, target)?;
+                let of_axis = &loaded.config.axis[&axis];
+                steps.extend(zero_of(&axis, of_axis));
+                steps.push(calibration(store, (&axis, &axis), intent)?);
+                let corrected = match args.agreed.uncompensated {
+                    true => Corrected::No,
+                    false => stored_corrected(loaded, store, (&axis, target))?,
+                };
+                corrected.require(&axis, target, args.agreed.agreed())?;
+                steps.push(moved(&axis, of_axis, (target, corrected)));
+            }
+            Ok(steps)
+        }
+    }
+}
+
+/// What the calibration in use corrects at a target.
+fn stored_corrected(
+    loaded: &Loaded,
+    store: &Store,
+    (axis, target): (&str, Metres),
+) -> Result<Corrected, Failure> {
+    let course = stored_course(loaded, axis, store)?;
+    Ok(course.map_or(Corrected::No, |(_, course)| course.corrected(target)))
+}
+
+fn moved(axis: &str, of_axis: &AxisConfig, (target, corrected): (Metres, Corrected)) -> Step {
+    let mut text = format!(
+        "to {} mm, at {} mm/s",
+        Short(target.mm()),
+        Short(of_axis.motion.speed_mm_per_s)
+    );
+    if let Some(warning) = warning_of(corrected, target) {
+        text += &format!("; {warning}");
+    }
+    Step::new("move", axis, text)
+}
+
+fn zeroed(loaded: &Loaded, args: &AxisArgs) -> Result<Vec<Step>, Failure> {
+    let config = &loaded.config;
+    let Some(gantry) = gantry::asked_for(config, args.axis.as_deref()) else {
+        let axis = choose_axis(config.axis.keys().cloned().collect(), args)?;
+        return Ok(zero_of(&axis, &config.axis[&axis]).into_iter().collect());
+    };
+    let [first, second] = &config.gantry[&gantry].axes;
+    let together = format!("{first} and {second} together, then each by itself");
+    let sides = [first, second];
+    let each = sides
+        .into_iter()
+        .filter_map(|it| zero_of(it, &config.axis[it]));
+    Ok([Step::new("zero", &gantry, together)]
+        .into_iter()
+        .chain(each)
+        .collect())
+}
+
+/// The way to the zero; `None` for an axis that is not configured for one, which its verb refuses.
+fn zero_of(axis: &str, of_axis: &AxisConfig) -> Option<Step> {
+    let own = of_axis.zero.as_ref()?;
+    let text = format!(
+        "to its negative limit switch at {} mm/s, on to its nominal zero {} mm from there, then to and fro past \
+         two Hall sensors at {} mm/s, no farther than {} mm",
+        Short(own.reference_speed_mm_per_s),
+        Short(-own.negative_limit_mm),
+        Short(own.search_speed_mm_per_s),
+        Short(own.search_limit_mm),
+    );
+    Some(Step::new("zero", axis, text))
+}
+
+fn measured(
+    loaded: &Loaded,
+    store: &Store,
+    intent: Intent<'_>,
+    (args, stage): (&AxisArgs, Stage),
+) -> Result<Vec<Step>, Failure> {
+    let axis = choose_axis(loaded.config.axis.keys().cloned().collect(), args)?;
+    if stage == Stage::Verify && !intent.is_uncompensated() {
+        require_active(store, &axis)?;
+    }
+    let of_axis = &loaded.config.axis[&axis];
+    let mut steps: Vec<Step> = zero_of(&axis, of_axis).into_iter().collect();
+    steps.push(calibration(store, (&axis, &axis), intent)?);
+    steps.extend(run_of(&axis, of_axis, stage));
+    Ok(steps)
+}
+
+/// The measuring run; `None` for an axis that is not configured for it, which its verb refuses.
+fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage) -> Option<Step> {
+    let plan = plan_of(of_axis, stage)?;
+    let speed = speed_of(of_axis);
+    let planned = plan.planned(speed);
+    let (first, last) = (plan.targets.first()?, plan.targets.last()?);
+    let mut text = format!(
+        "{} from {} to {} mm, {} from each side, read by {}: {} m at {} mm/s, {} at least",
+        Several(plan.targets.len() as u64, "position"),
+        Short(first.mm()),
+        Short(last.mm()),
+        Several(plan.runs, "time"),
+        plan.instrument,
+        Short(planned.travel.value()),
+        Short(of_axis.motion.speed_mm_per_s),
+        ShortSpan(planned.at_least),
+    );
+    let what = match stage {
+        Stage::Calibrate => {
+            text += "; what was found is stored and used from then on";
+            "calibrate"
+        }
+        _ => {
+            let tolerance = of_axis.verify.as_ref().map(|it| it.accuracy_tolerance_um);
+            text += &tolerance.map_or(String::new(), |it| format!("; tolerance {} µm", Short(it)));
+            "verify"
+        }
+    };
+    Some(Step::new(what, axis, text))
+}

@@ -1,0 +1,206 @@
+//! What a verb is going to do, said before anything moves. No machine is there, and none is needed.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use nix::pty::openpty;
+use serde_json::Value;
+use tests::{Edit, LINEAR, ROTARY, Shipped, UVW, VOLUMETRIC};
+
+use crate::programs::{check_says, program, text, truestage};
+
+/// A folder with the configuration of a machine, after `change`.
+fn desk(shipped: Shipped, change: impl Fn(&str) -> String) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let file = folder.path().join("machine.toml");
+    fs::write(file, change(shipped.machine)).expect("a file can be written");
+    folder
+}
+
+/// `what` of each step that `words` would do.
+#[track_caller]
+fn check(shipped: Shipped, words: &[&str], expected: &[(&str, &str)]) -> Value {
+    let folder = desk(shipped, str::to_owned);
+    let words: Vec<_> = words.iter().copied().chain(["--dry-run"]).collect();
+    let said = truestage(folder.path(), &words).with_code(0);
+    let steps = said["steps"].as_array().expect("a list of steps");
+    let steps: Vec<_> = steps
+        .iter()
+        .map(|it| (text(&it["what"]), text(&it["whose"])))
+        .collect();
+    assert_eq!(steps, expected, "{said:#}");
+    assert!(
+        !folder.path().join("machine-data").exists(),
+        "nothing is written"
+    );
+    said
+}
+
+#[test]
+fn each_verb_says_what_it_is_going_to_do() {
+    check(LINEAR, &["zero"], &[("zero", "x")]);
+    let measured = [("zero", "x"), ("calibration", "x"), ("calibrate", "x")];
+    let said = check(LINEAR, &["calibrate"], &measured);
+    check_says(
+        &said.to_string(),
+        &[
+            "20 mm/s",
+            "21 positions from 0 to 60 mm, 3 times",
+            "read by laser",
+            "stored",
+        ],
+    );
+    let moved = [("zero", "x"), ("calibration", "x"), ("move", "x")];
+    let said = check(LINEAR, &["move", "x=12.5mm", "--uncompensated"], &moved);
+    check_says(
+        &said.to_string(),
+        &["to 12.5 mm, at 200 mm/s", "NOT CORRECTED"],
+    );
+
+    let turned = [("zero", "c"), ("calibration", "c"), ("move", "c")];
+    let said = check(ROTARY, &["move", "c=400deg", "--uncompensated"], &turned);
+    check_says(
+        &said.to_string(),
+        &["to 40°, by the shortest way", "400° is 40°"],
+    );
+    let measured = [("zero", "c"), ("calibration", "c"), ("calibrate", "c")];
+    let said = check(ROTARY, &["calibrate"], &measured);
+    check_says(&said.to_string(), &["GP-360-0001", "at the offsets [0, "]);
+
+    let whole = ("zero", "platform");
+    let screws = [
+        ("calibration", "u"),
+        ("calibration", "v"),
+        ("calibration", "w"),
+    ];
+    let steps = [&[whole][..], &screws, &[("verify", "platform")]].concat();
+    check(UVW, &["verify"], &steps);
+    let steps = [&[whole][..], &screws, &[("move", "platform")]].concat();
+    let said = check(UVW, &["move", "x=1mm", "--uncompensated"], &steps);
+    check_says(
+        &said.to_string(),
+        &["y and theta stay where the camera sees them"],
+    );
+
+    let all = "x, y, z";
+    let steps = [("zero", all), ("calibration", all), ("calibrate", all)];
+    let said = check(VOLUMETRIC, &["calibrate"], &steps);
+    check_says(
+        &said.to_string(),
+        &["z, then y, then x", "lines that somebody sets laser up for"],
+    );
+}
+
+/// With the code and the words of the verb itself.
+#[test]
+fn what_the_verb_would_refuse_is_refused() {
+    let refused = |shipped, words: &[&str], code, said: &str| {
+        let folder = desk(shipped, str::to_owned);
+        let error = truestage(folder.path(), words).with_code(code);
+        assert!(text(&error["error"]).contains(said), "{error}");
+    };
+    refused(
+        LINEAR,
+        &["move", "x=12.5mm", "--dry-run"],
+        3,
+        "no calibration",
+    );
+    let words = ["move", "x=99mm", "--uncompensated", "--dry-run"];
+    refused(LINEAR, &words, 3, "soft limits");
+    refused(LINEAR, &["move", "y=1mm", "--dry-run"], 2, "no axis `y`");
+    refused(LINEAR, &["verify", "--dry-run"], 2, "no active calibration");
+    refused(
+        ROTARY,
+        &["move", "c=1deg", "--dry-run"],
+        3,
+        "no calibration",
+    );
+    refused(
+        UVW,
+        &["move", "x=1mm", "--dry-run"],
+        3,
+        "without a calibration",
+    );
+    refused(
+        VOLUMETRIC,
+        &["move", "x=1mm", "--dry-run"],
+        3,
+        "never measured",
+    );
+    let words = ["move", "x=9999mm", "--uncompensated", "--dry-run"];
+    refused(VOLUMETRIC, &words, 3, "x");
+}
+
+#[test]
+fn a_path_is_judged_without_a_machine() {
+    let folder = desk(VOLUMETRIC, str::to_owned);
+    let path = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n2,10,10,10\n4,20,0,10\n";
+    fs::write(folder.path().join("path.csv"), path).expect("a file can be written");
+    let words = ["run", "path.csv", "--uncompensated", "--dry-run"];
+    let said = truestage(folder.path(), &words).with_code(0);
+    assert_eq!(
+        (&said["dry_run"], &said["points"]),
+        (&true.into(), &2001.into())
+    );
+    fs::write(
+        folder.path().join("path.csv"),
+        path.edit("4,20,0,10", "2.01,200,0,10"),
+    )
+    .expect("a file can be written");
+    truestage(folder.path(), &words).with_code(3);
+}
+
+/// What `truestage` says at a terminal where `answer` is typed, and its exit code.
+fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (String, Option<i32>) {
+    let terminal = openpty(None, None).expect("a terminal can be had");
+    let slave = || {
+        Stdio::from(
+            terminal
+                .slave
+                .try_clone()
+                .expect("a terminal can be shared"),
+        )
+    };
+    let mut command = Command::new(program("truestage"));
+    command.current_dir(folder).args(words);
+    let mut running = command
+        .stdin(slave())
+        .stderr(slave())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("it is there");
+    drop((command, terminal.slave));
+    let mut master = fs::File::from(terminal.master);
+    master.write_all(answer.as_bytes()).expect("somebody types");
+    let mut seen = Vec::new();
+    let _ = master.read_to_end(&mut seen);
+    let code = running.wait().expect("a child can be waited for").code();
+    (String::from_utf8_lossy(&seen).into_owned(), code)
+}
+
+#[test]
+fn a_person_is_asked_and_a_script_is_not() {
+    let absent = "path = \"/dev/no-such-adapter\"";
+    let folder = desk(LINEAR, |text| text.edit("path = \"/dev/ttyACM1\"", absent));
+    let (seen, code) = at_a_terminal(folder.path(), &["zero"], "n\n");
+    check_says(
+        &seen,
+        &[
+            "stage TS-LIN-0001",
+            "x: zero: to its negative limit",
+            "go on?",
+        ],
+    );
+    check_says(&seen, &["nothing was moved", "--yes"]);
+    assert_eq!(code, Some(2));
+    // It goes on, and finds that nothing is connected.
+    let (seen, code) = at_a_terminal(folder.path(), &["zero"], "y\n");
+    check_says(&seen, &["go on?", "no-such-adapter"]);
+    assert_eq!(code, Some(4));
+    let (seen, code) = at_a_terminal(folder.path(), &["zero", "--yes"], "");
+    assert!(!seen.contains("go on?"), "{seen}");
+    assert_eq!(code, Some(4));
+    assert_eq!(truestage(folder.path(), &["zero"]).code, Some(4));
+}
