@@ -44,6 +44,8 @@
 mod agreed;
 mod assemble;
 mod bus_plan;
+#[cfg(test)]
+mod chance;
 pub mod config;
 mod connected;
 mod correction;

@@ -4,8 +4,10 @@ use core::fmt;
 use core::ops::Range;
 use std::path::PathBuf;
 
+use serde::Serialize;
+
 /// One finding.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
     /// The file as it was named.
     pub file: String,
@@ -13,7 +15,7 @@ pub struct Diagnostic {
     pub line: usize,
     /// Counted from 1, in characters.
     pub column: usize,
-    /// The key's path, such as `axis.x.soft_min_mm`; empty for a syntax error.
+    /// The key's path, such as `axis.x.soft_min_mm`; empty where none can be told.
     pub key: String,
     /// What is wrong.
     pub cause: String,

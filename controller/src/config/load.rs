@@ -13,7 +13,9 @@ use super::model::MachineConfig;
 use super::place::span_of;
 use super::schema;
 use super::structure::{self, Part};
+use super::syntax;
 use super::validate::{Finding, validate};
+use super::warnings;
 use machine::Patience;
 
 /// A configuration that was read and judged sound.
@@ -23,6 +25,8 @@ pub struct Loaded {
     pub config: MachineConfig,
     /// Of everything in it that a calibration depends on.
     pub hash: ConfigHash,
+    /// What is doubtful of it, in the order of the file.
+    pub warnings: Vec<Diagnostic>,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
     /// own pauses do not shrink, so its time-outs must bear them.
@@ -68,8 +72,10 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     let config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
+    let warnings = warnings::of(&config).into_iter();
     Ok(Loaded {
         hash: hash_of(&config),
+        warnings: placed(text, file, warnings.map(|it| (it, Part::Value))),
         config,
         patience: Patience::NONE,
     })
@@ -125,7 +131,8 @@ fn is_within(key: &str, section: &str) -> bool {
 fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let span = error.span().unwrap_or(0..0);
     let message = error.message().lines().next().unwrap_or("not valid");
-    let finding = Diagnostic::at(file, text, &span, "", message.to_owned(), String::new());
+    let Finding { key, cause, help } = syntax::explained(text, &span, message);
+    let finding = Diagnostic::at(file, text, &span, &key, cause, help);
     ConfigError::Invalid {
         findings: vec![finding],
     }
@@ -133,13 +140,23 @@ fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
 
 /// Each finding at its place, in the order of the file.
 fn invalid(text: &str, file: &str, findings: Vec<(Finding, Part)>) -> ConfigError {
-    let placed = findings.into_iter().map(|(it, part)| {
+    ConfigError::Invalid {
+        findings: placed(text, file, findings.into_iter()),
+    }
+}
+
+fn placed(
+    text: &str,
+    file: &str,
+    findings: impl Iterator<Item = (Finding, Part)>,
+) -> Vec<Diagnostic> {
+    let placed = findings.map(|(it, part)| {
         let span = span_of(text, &it.key, part).unwrap_or(0..0);
         Diagnostic::at(file, text, &span, &it.key, it.cause, it.help)
     });
-    let mut findings: Vec<_> = placed.collect();
-    findings.sort_by_key(|it| (it.line, it.column));
-    ConfigError::Invalid { findings }
+    let mut placed: Vec<_> = placed.collect();
+    placed.sort_by_key(|it| (it.line, it.column));
+    placed
 }
 
 #[cfg(test)]

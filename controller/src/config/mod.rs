@@ -11,12 +11,16 @@ mod impossible_tests;
 pub(crate) mod judge;
 mod load;
 mod model;
+#[cfg(test)]
+mod mutated_tests;
 mod place;
 #[cfg(test)]
 mod reference;
 pub(crate) mod schema;
 mod structure;
+mod syntax;
 pub(crate) mod validate;
+pub(crate) mod warnings;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;

@@ -109,16 +109,35 @@ const fn kind(value: &Value) -> &'static str {
 
 fn correction(expected: &str, value: &Value) -> String {
     match (expected, value) {
-        ("number" | "integer" | "boolean", Value::String(text)) => {
-            format!("write it without quotes: {text}")
-        }
+        ("number" | "integer", Value::String(text)) => match number_in(text) {
+            Some(number) if number == text => format!("write it without quotes: {number}"),
+            Some(number) => {
+                format!("write it without quotes and unit: {number}; a key's ending is its unit")
+            }
+            None => format!("give {}", in_words(expected)),
+        },
         ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
             format!("write it in quotes: \"{value}\"")
         }
         ("integer", Value::Float(it)) => format!("write {:.0}", it),
+        ("array", Value::Table(_)) => "write a list: [...]".into(),
         ("array", _) => "write it in brackets: [...]".into(),
-        _ => String::new(),
+        ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
+            [one] => format!("write it without brackets: {one}"),
+            _ => format!("give {} and no list", in_words(expected)),
+        },
+        ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),
+        _ => format!("give {}", in_words(expected)),
     }
+}
+
+/// The number that a text begins with, whatever follows.
+fn number_in(text: &str) -> Option<&str> {
+    let text = text.trim();
+    let is_digit = |it: char| it.is_ascii_digit() || "+-._eE".contains(it);
+    let end = text.find(|it| !is_digit(it)).unwrap_or(text.len());
+    let number = &text[..end];
+    number.parse::<f64>().is_ok().then_some(number)
 }
 
 fn table(path: &str, seen: &Table, schema: &Schema, findings: &mut Findings) {
@@ -146,8 +165,13 @@ fn table(path: &str, seen: &Table, schema: &Schema, findings: &mut Findings) {
                 let (cause, help) = match is_anothers {
                     true => (section.has_no_such_key(), "remove it".to_owned()),
                     false => {
-                        mistyped.extend(meant(key, &free));
-                        ("there is no such key here".to_owned(), advice(key, &free))
+                        // What must be there and is not comes first.
+                        let lacks = meant(key, &section.lacking(&free));
+                        let meant = lacks.or_else(|| meant(key, &free));
+                        mistyped.extend(meant);
+                        let cause = "there is no such key here".to_owned();
+                        let part = section.part_meant(key, value);
+                        (cause, part.unwrap_or_else(|| advice(meant, &free)))
                     }
                 };
                 let key = below(path, key);
@@ -206,6 +230,25 @@ impl<'a> Section<'a> {
         self.keys.extend(keys.map(|(key, own)| (key.as_str(), own)));
         let required = part["required"].as_array().into_iter().flatten();
         self.required.extend(required.filter_map(Schema::as_str));
+    }
+
+    /// The keys of `free` that must be there.
+    fn lacking(&self, free: &[&'a str]) -> Vec<&'a str> {
+        let lacks = free.iter().filter(|it| self.required.contains(it));
+        lacks.copied().collect()
+    }
+
+    /// What to say of a mistyped part of a section's name (`[axsi.x.zero]`), which other sections may have right.
+    fn part_meant(&self, key: &str, value: &Value) -> Option<String> {
+        let lists = value
+            .as_array()
+            .is_some_and(|it| it.iter().all(Value::is_table));
+        if !(value.is_table() || lists) {
+            return None;
+        }
+        let keys: Vec<&str> = self.keys.keys().copied().collect();
+        let key = meant(key, &keys)?;
+        Some(format!("did you mean `{key}`?"))
     }
 
     fn is_of_another_device(&self, key: &str) -> bool {
@@ -273,9 +316,10 @@ fn figure(value: &Value) -> Option<f64> {
 
 fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
     let bound = |key: &str| schema[key].as_f64();
+    let (least, most) = whole_numbers(schema);
     let (low, high) = match schema["x-magnitude"].as_array() {
         Some(bounds) => (bounds[0].as_f64(), bounds[1].as_f64()),
-        None => (bound("minimum"), bound("maximum")),
+        None => (bound("minimum").or(least), bound("maximum").or(most)),
     };
     let value = match schema["x-magnitude"].is_array() {
         true => seen.abs(),
@@ -286,9 +330,9 @@ fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
     let is_whole = type_of(schema) != "integer" || seen.fract() == 0.0;
     if !(is_within && is_whole && seen.is_finite()) {
         let help = match (low, high) {
-            (Some(low), Some(high)) => format!("give {} to {}", Short(low), Short(high)),
-            (Some(low), None) => format!("give {} or more", Short(low)),
-            (None, Some(high)) => format!("give {} or less", Short(high)),
+            (Some(low), Some(high)) => format!("give {} to {}", whole(low), whole(high)),
+            (Some(low), None) => format!("give {} or more", whole(low)),
+            (None, Some(high)) => format!("give {} or less", whole(high)),
             (None, None) => "give a number".into(),
         };
         say_size(findings, path, seen, help);
@@ -298,6 +342,27 @@ fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
         let help = format!("give more than {}", Short(limit));
         say_size(findings, path, seen, help);
     }
+}
+
+/// A bound to its last digit, where it is a whole number.
+fn whole(bound: f64) -> String {
+    match bound.fract() == 0.0 && bound.abs() < 1e15 {
+        true => format!("{bound:.0}"),
+        false => Short(bound).to_string(),
+    }
+}
+
+/// What a whole number of this size can be.
+fn whole_numbers(schema: &Schema) -> (Option<f64>, Option<f64>) {
+    let (least, most): (i64, i64) = match schema["format"].as_str() {
+        Some("uint8") => (0, u8::MAX.into()),
+        Some("uint16") => (0, u16::MAX.into()),
+        Some("uint32") => (0, u32::MAX.into()),
+        Some("int16") => (i16::MIN.into(), i16::MAX.into()),
+        Some("int32") => (i32::MIN.into(), i32::MAX.into()),
+        _ => return (None, None),
+    };
+    (Some(least as f64), Some(most as f64))
 }
 
 /// The words that a value is one of, where it is one of words.
@@ -325,9 +390,9 @@ fn name(path: &str, value: &Value, names: &[&str], findings: &mut Findings) {
     say(findings, path, format!("{seen} is not known here"), help);
 }
 
-/// What somebody who wrote `seen` may have meant.
-fn advice(seen: &str, free: &[&str]) -> String {
-    match meant(seen, free) {
+/// What to write in place of a key that is not known, which may have `meant` another one.
+fn advice(meant: Option<&str>, free: &[&str]) -> String {
+    match meant {
         Some(key) => format!("did you mean `{key}`? A key's ending is its unit"),
         None if free.is_empty() => "remove it: every key of this section is there".into(),
         None => format!("known here: {}", free.join(", ")),
@@ -343,7 +408,23 @@ fn meant<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
     };
     let scored = free.iter().map(|key| (likeness(key), *key));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 >= LIKE).then_some(best.1)
+    match best.0 >= LIKE {
+        true => Some(best.1),
+        false => with_words_left_out(seen, free),
+    }
+}
+
+/// The only key of `free` that has all words of `seen`, and more.
+fn with_words_left_out<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
+    let has_all = |key: &&&str| {
+        let mut words = key.split('_');
+        seen.split('_').all(|wanted| words.any(|it| it == wanted))
+    };
+    let mut longer = free.iter().filter(has_all);
+    match (longer.next(), longer.next()) {
+        (Some(only), None) => Some(only),
+        _ => None,
+    }
 }
 
 /// So much alike two words are one that was mistyped.

@@ -12,6 +12,8 @@ use crate::store::golden::Golden;
 pub(crate) struct Kind {
     /// Which values of its part of a configuration are impossible.
     pub(crate) check: fn(&MachineConfig, &mut Vec<Finding>),
+    /// What is doubtful of its part of a configuration that is sound.
+    pub(crate) warnings: fn(&MachineConfig, &mut Vec<Finding>),
     /// What its calibrations depend on. The order of kinds in their list is that of the published text.
     pub(crate) depends: fn(&MachineConfig, &mut Place<'_>),
     /// What its calibrations say.

@@ -1,6 +1,5 @@
 //! Calibrate: measure the deviations, fit the error table, store it with all it depends on.
 
-use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::budget::AxisBudget;
@@ -9,12 +8,10 @@ use units::Metres;
 
 use crate::config::ConfigHash;
 use crate::failure::Failure;
-use crate::linear::CalibrateConfig;
 use crate::linear::LinearContent;
 use crate::linear::LinearLog;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
-use crate::linear::positions::positions;
-use crate::linear::run_plan::RunPlan;
+use crate::linear::run_plan::{RunPlan, of_calibration};
 use crate::linear::settings;
 use crate::linear::stage::{LinearStage, Usable};
 use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
@@ -60,7 +57,7 @@ impl LinearStage<'_> {
         let plan = RunPlan {
             closure_limit: (!options.accept_drift)
                 .then(|| Metres::from_um(config.closure_limit_um)),
-            ..run_plan(&config)
+            ..of_calibration(&config)
         };
         // Before the header, which says who measures.
         self.core.use_instrument(&plan.instrument)?;
@@ -241,18 +238,5 @@ pub(super) fn open_journal(
             };
             Ok((journal, earlier))
         }
-    }
-}
-
-pub(super) fn run_plan(config: &CalibrateConfig) -> RunPlan {
-    RunPlan {
-        instrument: config.instrument.clone(),
-        targets: positions(config),
-        runs: config.runs,
-        overrun: Metres::from_mm(config.overrun_mm),
-        settle: Duration::from_millis(config.settle_ms.into()),
-        average_samples: config.average_samples,
-        scale_limit_ppm: config.scale_limit_ppm,
-        closure_limit: None,
     }
 }

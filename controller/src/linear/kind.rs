@@ -8,10 +8,12 @@ use crate::linear::dependence::depends;
 #[cfg(test)]
 use crate::linear::golden::GOLDEN;
 use crate::linear::record::LinearContent;
+use crate::linear::warnings::warnings;
 
 pub(crate) const KIND: Kind = Kind {
     check,
     depends,
+    warnings,
     contents: &[ContentKind::of::<LinearContent>()],
     #[cfg(test)]
     golden: GOLDEN,

@@ -27,7 +27,7 @@ mod pairing;
 mod passes;
 pub(crate) mod positions;
 pub(crate) mod record;
-mod run_plan;
+pub(crate) mod run_plan;
 pub(crate) mod settings;
 mod sound;
 mod stage;
@@ -38,6 +38,7 @@ mod table_correction;
 mod told;
 mod travel;
 pub(crate) mod verify;
+mod warnings;
 pub(crate) mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.

@@ -2,7 +2,12 @@
 
 use core::time::Duration;
 
+use machine::Stage;
 use units::{Metres, MetresPerSecond};
+
+use crate::config::AxisConfig;
+use crate::linear::positions::positions;
+use crate::linear::{CalibrateConfig, VerifyConfig};
 
 /// What is measured, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,4 +59,50 @@ pub struct PlannedRun {
     pub travel: Metres,
     /// How long that takes at least: the ways at the usual speed, and standing.
     pub at_least: Duration,
+}
+
+/// Of a calibration.
+pub(super) fn of_calibration(config: &CalibrateConfig) -> RunPlan {
+    RunPlan {
+        instrument: config.instrument.clone(),
+        targets: positions(config),
+        runs: config.runs,
+        overrun: Metres::from_mm(config.overrun_mm),
+        settle: Duration::from_millis(config.settle_ms.into()),
+        average_samples: config.average_samples,
+        scale_limit_ppm: config.scale_limit_ppm,
+        closure_limit: None,
+    }
+}
+
+/// The measuring run that is configured for `axis`.
+pub(crate) fn plan_of(axis: &AxisConfig, of: Stage) -> Option<RunPlan> {
+    match of {
+        Stage::Calibrate => Some(of_calibration(axis.calibrate.as_ref()?)),
+        Stage::Verify => Some(of_verification(axis.verify.as_ref()?, 0.0)),
+        Stage::Zero | Stage::Reference | Stage::Job => None,
+    }
+}
+
+/// How fast an axis goes unless it is told otherwise.
+pub(crate) fn speed_of(axis: &AxisConfig) -> MetresPerSecond {
+    MetresPerSecond(axis.motion.speed_mm_per_s * 1e-3)
+}
+
+/// Of a verification.
+pub(super) fn of_verification(config: &VerifyConfig, scale_limit_ppm: f64) -> RunPlan {
+    let step = (config.end_mm - config.start_mm) / f64::from(config.targets - 1);
+    let targets = (0..config.targets)
+        .map(|at| Metres::from_mm(config.start_mm + f64::from(at) * step))
+        .collect();
+    RunPlan {
+        instrument: config.instrument.clone(),
+        targets,
+        runs: config.runs,
+        overrun: Metres::from_mm(config.overrun_mm),
+        settle: Duration::from_millis(config.settle_ms.into()),
+        average_samples: config.average_samples,
+        scale_limit_ppm,
+        closure_limit: None,
+    }
 }

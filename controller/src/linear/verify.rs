@@ -1,19 +1,16 @@
 //! Verify: measure again, at positions between the calibrated ones, and judge by ISO 230-2.
 
-use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::budget::Combined;
 use compensator::error_table::ErrorTable;
 use compensator::iso230::{self, Figures};
-use units::{Approach, Metres, MetresPerSecond};
+use units::{Approach, Metres};
 
-use crate::config::AxisConfig;
 use crate::failure::Failure;
-use crate::linear::VerifyConfig;
-use crate::linear::calibrate::{self, open_journal};
+use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured};
-use crate::linear::run_plan::{PlannedRun, RunPlan};
+use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
@@ -96,7 +93,7 @@ impl LinearStage<'_> {
                 help: "load or make one, or verify uncompensated".into(),
             });
         }
-        let plan = run_plan(&config, scale_limit_ppm);
+        let plan = of_verification(&config, scale_limit_ppm);
         // Before the header, which says who measures.
         self.core.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", &plan, options.calibration.clone());
@@ -196,35 +193,4 @@ fn systematic_deviation(table: &ErrorTable) -> Metres {
     let largest = deviations().fold(Metres(f64::NEG_INFINITY), Metres::max);
     let smallest = deviations().fold(Metres(f64::INFINITY), Metres::min);
     largest - smallest
-}
-
-/// The measuring run that is configured for `axis`.
-pub(crate) fn plan_of(axis: &AxisConfig, of: Stage) -> Option<RunPlan> {
-    match of {
-        Stage::Calibrate => Some(calibrate::run_plan(axis.calibrate.as_ref()?)),
-        Stage::Verify => Some(run_plan(axis.verify.as_ref()?, 0.0)),
-        Stage::Zero | Stage::Reference | Stage::Job => None,
-    }
-}
-
-/// How fast an axis goes unless it is told otherwise.
-pub(crate) fn speed_of(axis: &AxisConfig) -> MetresPerSecond {
-    MetresPerSecond(axis.motion.speed_mm_per_s * 1e-3)
-}
-
-fn run_plan(config: &VerifyConfig, scale_limit_ppm: f64) -> RunPlan {
-    let step = (config.end_mm - config.start_mm) / f64::from(config.targets - 1);
-    let targets = (0..config.targets)
-        .map(|at| Metres::from_mm(config.start_mm + f64::from(at) * step))
-        .collect();
-    RunPlan {
-        instrument: config.instrument.clone(),
-        targets,
-        runs: config.runs,
-        overrun: Metres::from_mm(config.overrun_mm),
-        settle: Duration::from_millis(config.settle_ms.into()),
-        average_samples: config.average_samples,
-        scale_limit_ppm,
-        closure_limit: None,
-    }
 }

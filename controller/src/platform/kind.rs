@@ -8,10 +8,12 @@ use crate::platform::dependence::depends;
 #[cfg(test)]
 use crate::platform::golden::GOLDEN;
 use crate::platform::record::ScrewContent;
+use crate::platform::warnings::warnings;
 
 pub(crate) const KIND: Kind = Kind {
     check,
     depends,
+    warnings,
     contents: &[ContentKind::of::<ScrewContent>()],
     #[cfg(test)]
     golden: GOLDEN,

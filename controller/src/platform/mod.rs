@@ -27,6 +27,7 @@ mod sound;
 pub(crate) mod state;
 mod take_up;
 pub(crate) mod verify;
+mod warnings;
 pub(crate) mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.

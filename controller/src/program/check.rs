@@ -8,7 +8,6 @@ use units::Several;
 use crate::config;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
-use crate::program::warnings;
 
 pub(crate) fn run(path: &Path, output: Output) -> Ended {
     let loaded = config::load(path)?;
@@ -25,17 +24,15 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
         Several(loaded.config.camera.len(), "camera"),
         &loaded.hash.as_str()[..12],
     );
-    let warnings = warnings::of(&loaded.config);
-    let text = warnings
-        .iter()
-        .fold(text, |text, it| format!("{text}\nwarning: {it}"));
+    let warnings = loaded.warnings.iter();
+    let text = warnings.fold(text, |text, it| format!("{text}\nwarning: {it}"));
     let notes = KINDS.iter().flat_map(|it| (it.notes)(&loaded.config));
     let notes: Vec<_> = notes.collect();
     let text = notes.iter().fold(text, |text, note| text + "\n" + note);
     output.result(
         &text,
         &json!({"ok": true, "machine": machine.name, "hash": loaded.hash.as_str(), "notes": notes,
-                "warnings": warnings}),
+                "warnings": loaded.warnings}),
     )
 }
 

@@ -42,7 +42,6 @@ mod targets;
 mod text;
 mod verbs;
 mod volumetric;
-mod warnings;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -5,6 +5,7 @@ use std::io::Write;
 use serde_json::{Value, json};
 
 use crate::Failure;
+use crate::config::ConfigError;
 use crate::linear::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
@@ -72,7 +73,10 @@ impl Output {
     /// Why there is no result.
     pub(crate) fn failure(self, failure: &Failure) {
         if self.json {
-            let error = json!({"error": failure.to_string(), "exit_code": failure.exit_code()});
+            let mut error = json!({"error": failure.to_string(), "exit_code": failure.exit_code()});
+            if let Failure::Config(ConfigError::Invalid { findings }) = failure {
+                error["findings"] = json!(findings);
+            }
             self.print("", &error);
         }
         self.note(&format!("error: {failure}"));

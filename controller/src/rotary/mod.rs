@@ -42,6 +42,7 @@ pub(crate) mod sweep;
 mod table;
 mod turn;
 pub(crate) mod verify;
+mod warnings;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use failure::RotaryFailure;

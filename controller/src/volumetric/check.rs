@@ -266,8 +266,10 @@ fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
             judge.say(
                 &key("over"),
                 format!(
-                    "thermometers {} and {:?} are not two of the {known}",
-                    bend.over, bend.under
+                    "thermometers {} and {} are not two of the {known}",
+                    bend.over,
+                    bend.under
+                        .map_or_else(|| "none".to_owned(), |it| it.to_string())
                 ),
                 "count [[volumetric.temperature]] from 0",
             );

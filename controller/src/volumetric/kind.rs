@@ -8,10 +8,12 @@ use crate::volumetric::dependence::depends;
 #[cfg(test)]
 use crate::volumetric::golden::GOLDEN;
 use crate::volumetric::record::{BeamReferencesContent, GeometryContent, StateMemoryContent};
+use crate::volumetric::warnings::warnings;
 
 pub(crate) const KIND: Kind = Kind {
     check,
     depends,
+    warnings,
     contents: &[
         ContentKind::of::<GeometryContent>(),
         ContentKind::of::<BeamReferencesContent>(),

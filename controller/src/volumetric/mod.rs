@@ -48,6 +48,7 @@ mod sound;
 mod state;
 mod thermometers;
 pub(crate) mod verify;
+mod warnings;
 mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.

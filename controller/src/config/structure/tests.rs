@@ -157,3 +157,34 @@ fn each_number_of_a_list_is_judged() {
     let key = "volumetric.beam.x.slider.gain";
     check(VOLUMETRIC, "layout = ", to, key, says);
 }
+
+#[test]
+fn a_mistyped_part_of_a_sections_name_is_told_with_the_one_that_others_have_right() {
+    for (from, to, key, help) in [
+        (
+            "[axis.x.verify]",
+            "[axsi.x.verify]",
+            "axsi",
+            "did you mean `axis`?",
+        ),
+        (
+            "[instrument.laser]",
+            "[instrumnet.laser]",
+            "instrumnet",
+            "did you mean `instrument`?",
+        ),
+    ] {
+        let found = findings(&LINEAR.edit_first(from, to));
+        let told = found.iter().find(|it| it.key == key);
+        let told = told.unwrap_or_else(|| panic!("{found:#?}"));
+        assert!(told.help.contains(help), "{told}");
+    }
+}
+
+#[test]
+fn a_number_that_is_too_large_for_its_key_says_what_fits() {
+    let from = "bitrate_bit_per_s = 1000000";
+    let key = "can.can0.bitrate_bit_per_s";
+    let says = ["1000000000000 is impossible", "give 0 to 4294967295"];
+    check(LINEAR, from, "bitrate_bit_per_s = 1000000000000", key, says);
+}

@@ -55,6 +55,17 @@ pub enum ModuleConfig {
     Dcon(DconConfig),
 }
 
+impl ModuleConfig {
+    /// The device profile of its modules; `None` for those that are not on CAN.
+    pub(crate) const fn profile(&self) -> Option<u32> {
+        match self {
+            Self::Cia401(_) => Some(401),
+            Self::Cia404(_) => Some(404),
+            Self::Dcon(_) => None,
+        }
+    }
+}
+
 /// What a family of analog modules is to a machine.
 pub(crate) trait Family {
     /// The bus or line that it is on.

@@ -3,6 +3,8 @@
 use compensator::length_correction::Settings;
 use units::{Metres, Short};
 
+use crate::config::judge::Finding;
+
 /// n − 1 of air in a workshop: so much longer a path counts that is not corrected for air (Edlén, Ciddor: 271.4 ppm
 /// at 20 °C and 1013.25 hPa).
 const AIR_PPM: f64 = 271.4;
@@ -31,8 +33,23 @@ enum Effect {
 }
 
 impl SwitchedOff {
+    /// The warning where it is switched off; `whose` calibration is `length` long.
+    pub(crate) fn warned(&self, instrument: &str, whose: &str, length: Metres) -> Finding {
+        Finding {
+            key: format!("instrument.{instrument}.{}", self.key),
+            cause: format!(
+                "{whose}: readings are NOT CORRECTED for {}, {}",
+                self.name,
+                self.told(length)
+            ),
+            help: "switch it on; a calibration made without says so, counts it as uncertainty, and is foreign \
+                   afterwards"
+                .into(),
+        }
+    }
+
     /// What it comes to over `length`.
-    pub(crate) fn told(&self, length: Metres) -> String {
+    fn told(&self, length: Metres) -> String {
         let of_length = |ppm: f64| {
             let um = Short((length.um() * ppm * 1e-6 * 1e3).round() / 1e3);
             format!("{um} µm over {} mm", Short(length.mm()))

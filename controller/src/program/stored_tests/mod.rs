@@ -13,10 +13,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use mutation::{Chance, edit, edit_lines};
+use mutation::{edit, edit_lines};
 use nix::time::{ClockId, clock_gettime};
 use serde_json::Value;
 
+use crate::chance::Chance;
 use crate::program::output::Output;
 use crate::program::{cal, report};
 use crate::store::golden::Golden;

@@ -1,0 +1,215 @@
+//! Files that somebody mistyped: each is refused with its place, its key, the cause and what to write, and what was
+//! mistyped is told with what was meant.
+//!
+//! A file is drawn by a seed: `MUTATIONS=20000 cargo test -p truestage --lib mutated_tests -- --nocapture` tries as many.
+
+use std::collections::BTreeMap;
+
+use crate::chance::Chance;
+use crate::config::diagnostic::Diagnostic;
+use crate::config::{ConfigError, parse};
+
+const SHIPPED: [&str; 6] = [
+    include_str!("../../../configs/machines/gantry.toml"),
+    include_str!("../../../configs/machines/linear.toml"),
+    include_str!("../../../configs/machines/rotary.toml"),
+    include_str!("../../../configs/machines/uvw.toml"),
+    include_str!("../../../configs/machines/uvw-copley.toml"),
+    include_str!("../../../configs/machines/volumetric.toml"),
+];
+
+/// So many in every run.
+const USUAL: usize = 1200;
+/// Of mistyped keys and sections, so many are told with the one that was meant.
+const RIGHT_MIN: f64 = 0.98;
+
+/// What somebody did to a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Slip {
+    Key,
+    Section,
+    TextForNumber,
+    UnitBehindNumber,
+    Twice,
+    WordWithoutQuotes,
+    NotANumber,
+    List,
+}
+
+const SLIPS: [Slip; 8] = [
+    Slip::Key,
+    Slip::Section,
+    Slip::TextForNumber,
+    Slip::UnitBehindNumber,
+    Slip::Twice,
+    Slip::WordWithoutQuotes,
+    Slip::NotANumber,
+    Slip::List,
+];
+
+/// A file as it was mistyped.
+struct Mistyped {
+    slip: Slip,
+    text: String,
+    /// Counted from 1.
+    line: usize,
+    /// The key, or the part of a section's name, that was meant or that has the wrong value.
+    meant: String,
+}
+
+/// A letter too few, too many, another one, two exchanged, or a word left out.
+fn mistype(word: &str, chance: &mut Chance) -> String {
+    let letters: Vec<char> = word.chars().collect();
+    let at = chance.below(letters.len());
+    let other = chance.of(&['a', 'e', 'n', 's', 't', '_']);
+    let mut seen = letters.clone();
+    match chance.below(5) {
+        0 => drop(seen.remove(at)),
+        1 => seen.insert(at, other),
+        2 => seen[at] = other,
+        3 if at + 1 < seen.len() => seen.swap(at, at + 1),
+        _ => {
+            let words: Vec<&str> = word.split('_').collect();
+            let without = chance.below(words.len());
+            let kept = words.iter().enumerate().filter(|(n, _)| *n != without);
+            let kept: Vec<&str> = kept.map(|(_, it)| *it).collect();
+            seen = kept.join("_").chars().collect();
+        }
+    }
+    seen.into_iter().collect()
+}
+
+/// The key and the value of a line.
+fn key_and_value(line: &str) -> Option<(&str, &str)> {
+    let (key, value) = line.split_once('=')?;
+    let is_key = !line.starts_with(['#', '[']);
+    is_key.then(|| {
+        (
+            key.trim(),
+            value.split('#').next().unwrap_or_default().trim(),
+        )
+    })
+}
+
+/// `None` where the drawn slip does not fit the drawn line.
+fn mistyped(seed: u64) -> Option<Mistyped> {
+    let mut chance = Chance(seed);
+    let text = chance.of(&SHIPPED);
+    let slip = chance.of(&SLIPS);
+    let lines: Vec<&str> = text.lines().collect();
+    let fits = |line: &&str| match slip {
+        Slip::Section => line.starts_with('['),
+        _ => key_and_value(line).is_some(),
+    };
+    let places: Vec<usize> = (0..lines.len()).filter(|at| fits(&lines[*at])).collect();
+    let at = chance.of(&places);
+    let (changed, meant) = changed(lines[at], slip, &mut chance)?;
+    let before = lines[..at].iter().copied();
+    let after = lines[at + 1..].iter().copied();
+    let text: Vec<&str> = before.chain([changed.as_str()]).chain(after).collect();
+    let line = at + 1 + usize::from(slip == Slip::Twice);
+    Some(Mistyped {
+        slip,
+        text: text.join("\n"),
+        line,
+        meant,
+    })
+}
+
+/// The line with the slip, and what was meant.
+fn changed(line: &str, slip: Slip, chance: &mut Chance) -> Option<(String, String)> {
+    if slip == Slip::Section {
+        let name = line.trim_start_matches('[').split(']').next()?;
+        // What users name themselves can be called anything, and a word too many is a section of its own.
+        let part = name.split('.').next()?;
+        let other = mistype(part, chance);
+        let is_other = other != part && !other.is_empty();
+        return is_other.then(|| (line.replacen(part, &other, 1), part.to_owned()));
+    }
+    let (key, value) = key_and_value(line)?;
+    let is_number = value.parse::<f64>().is_ok();
+    let is_text = value.starts_with('"') && value.len() > 2;
+    let told = |text: String| Some((text, key.to_owned()));
+    match slip {
+        Slip::Key => {
+            let other = mistype(key, chance);
+            (other != key && !other.is_empty())
+                .then(|| (format!("{other} = {value}"), key.to_owned()))
+        }
+        Slip::TextForNumber if is_number => told(format!("{key} = \"{value} mm\"")),
+        Slip::UnitBehindNumber if is_number => {
+            let unit = chance.of(&[" mm", "um", " mm/s", " V", "°"]);
+            told(format!("{key} = {value}{unit}"))
+        }
+        Slip::Twice => told(format!("{line}\n{line}")),
+        Slip::WordWithoutQuotes if is_text => told(format!("{key} = {}", value.trim_matches('"'))),
+        Slip::NotANumber if is_number => told(format!("{key} = nan")),
+        Slip::List if !value.starts_with('[') => told(format!("{key} = [{value}]")),
+        _ => None,
+    }
+}
+
+/// What is wrong with how a file was refused.
+fn complaint(it: &Mistyped) -> Option<String> {
+    let found = match parse(&it.text, "m.toml") {
+        Err(ConfigError::Invalid { findings }) => findings,
+        Err(other) => return Some(format!("{other}")),
+        Ok(_) => return Some("it is sound".into()),
+    };
+    let is_whole =
+        |one: &Diagnostic| !(one.key.is_empty() || one.cause.is_empty() || one.help.is_empty());
+    let told = |one: &Diagnostic| one.line == it.line && is_whole(one);
+    if !found.iter().any(told) {
+        return Some(format!(
+            "nothing whole is told of line {}: {found:#?}",
+            it.line
+        ));
+    }
+    let names = |one: &Diagnostic| one.key.split('.').any(|part| part == it.meant);
+    let is_mistyped = matches!(it.slip, Slip::Key | Slip::Section);
+    (!is_mistyped && !found.iter().any(names)).then(|| format!("no `{}` in {found:#?}", it.meant))
+}
+
+/// Whether a mistyped word is told with the one that was meant.
+fn is_meant(it: &Mistyped) -> bool {
+    let Err(ConfigError::Invalid { findings }) = parse(&it.text, "m.toml") else {
+        return false;
+    };
+    let wanted = format!("did you mean `{}`?", it.meant);
+    findings.iter().any(|one| one.help.starts_with(&wanted))
+}
+
+#[test]
+fn what_somebody_mistyped_is_refused_with_its_place_and_what_was_meant() {
+    let given = std::env::var("MUTATIONS").ok();
+    let count = given.and_then(|it| it.parse().ok()).unwrap_or(USUAL);
+    let drawn = (0..).filter_map(mistyped).take(count);
+    let mut tally: BTreeMap<Slip, usize> = BTreeMap::new();
+    let (mut words, mut right) = (0, 0);
+    let mut wrong = Vec::new();
+    for it in drawn {
+        *tally.entry(it.slip).or_default() += 1;
+        let shown = it.text.lines().nth(it.line - 1).unwrap_or_default();
+        wrong.extend(complaint(&it).map(|told| format!("{:?}, `{shown}`: {told}", it.slip)));
+        if matches!(it.slip, Slip::Key | Slip::Section) {
+            words += 1;
+            let is_right = is_meant(&it);
+            right += usize::from(is_right);
+            if !is_right {
+                println!("not told what was meant: `{shown}` for `{}`", it.meant);
+            }
+        }
+    }
+    println!("{tally:?}: {right} of {words} words told");
+    assert!(
+        wrong.is_empty(),
+        "{} of {count}:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+    assert!(tally.values().all(|it| *it >= count / 50), "{tally:?}");
+    assert!(
+        f64::from(right as u32) >= RIGHT_MIN * f64::from(words),
+        "{right} of {words}"
+    );
+}

@@ -1,0 +1,103 @@
+//! What is doubtful of a configuration that is sound: nothing of it is refused, all of it is told.
+
+use super::judge::{Finding, Judge};
+use super::model::MachineConfig;
+use crate::hardware::node::IdentityConfig;
+use crate::kinds::KINDS;
+
+/// What somebody should look at before anything moves.
+pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
+    let mut found = Vec::new();
+    check_profiles(config, &mut found);
+    for kind in KINDS {
+        (kind.warnings)(config, &mut found);
+    }
+    found
+}
+
+/// The device profile that a drive has (0x1000, its low half: CiA 301).
+const DRIVE: u32 = 402;
+
+/// Whether the device types are those of such devices.
+fn check_profiles(config: &MachineConfig, found: &mut Vec<Finding>) {
+    let axes = config.axis.iter();
+    let axes = axes.filter_map(|(name, it)| Some((format!("axis.{name}"), it.node()?, DRIVE)));
+    let tables = config.rotary.iter();
+    let tables = tables.map(|(name, it)| (format!("rotary.{name}"), &it.node, DRIVE));
+    let modules = config.analog.iter().filter_map(|(name, it)| {
+        let profile = it.module.profile()?;
+        Some((format!("analog.{name}"), it.node()?, profile))
+    });
+    for (key, node, profile) in axes.chain(tables).chain(modules) {
+        let judge = &mut Judge::at(format!("{key}.identity"), found);
+        check_profile(judge, &node.identity, profile);
+    }
+}
+
+fn check_profile(judge: &mut Judge<'_>, identity: &IdentityConfig, profile: u32) {
+    let seen = identity.device_type & 0xFFFF;
+    if seen == profile {
+        return;
+    }
+    judge.say(
+        "device_type",
+        format!(
+            "{:#010X} is a device of profile CiA {seen}, and this section is for one of CiA {profile}",
+            identity.device_type
+        ),
+        "take 0x1000 from what `truestage scan` found at this node",
+    );
+}
+
+#[cfg(test)]
+pub(crate) mod told {
+    use crate::Edit;
+    use crate::config::parse;
+
+    /// With each `from` of `edits` become its `to`, these are all keys with a warning, and the last one of it says this.
+    #[track_caller]
+    pub(crate) fn check(text: &str, edits: &[(&str, &str)], keys: &[&str], says: &str) {
+        let text = edits.iter().fold(text.to_owned(), |text, (from, to)| {
+            text.edit_first(from, to)
+        });
+        let loaded = parse(&text, "m.toml").unwrap_or_else(|error| panic!("{error}"));
+        let told: Vec<_> = loaded.warnings.iter().map(|it| it.key.as_str()).collect();
+        assert_eq!(told, keys, "{:#?}", loaded.warnings);
+        let last = loaded
+            .warnings
+            .last()
+            .map_or(String::new(), |it| it.cause.clone());
+        assert!(last.contains(says), "{last}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told::check;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+
+    #[test]
+    fn what_ships_is_beyond_doubt() {
+        for text in [
+            LINEAR,
+            include_str!("../../../configs/machines/gantry.toml"),
+            include_str!("../../../configs/machines/rotary.toml"),
+            include_str!("../../../configs/machines/uvw.toml"),
+            include_str!("../../../configs/machines/uvw-copley.toml"),
+            include_str!("../../../configs/machines/volumetric.toml"),
+        ] {
+            check(text, &[], &[], "");
+        }
+    }
+
+    #[test]
+    fn a_device_of_another_profile_is_told() {
+        let edit = ("device_type = 0x00020192", "device_type = 0x00040191");
+        let says = "0x00040191 is a device of profile CiA 401";
+        check(LINEAR, &[edit], &["axis.x.identity.device_type"], says);
+        let edit = ("device_type = 0x00040191", "device_type = 0x00020192");
+        let says = "this section is for one of CiA 401";
+        check(LINEAR, &[edit], &["analog.hall.identity.device_type"], says);
+    }
+}

@@ -1,0 +1,240 @@
+//! What is doubtful of linear axes that are sound.
+
+use machine::Stage;
+use units::{Metres, Short, ShortSpan};
+
+use crate::config::judge::{Finding, Judge};
+use crate::config::{AxisConfig, MachineConfig};
+use crate::linear::run_plan::{RunPlan, plan_of, speed_of};
+
+/// Fewer counts than this within which an axis must stand: it never does, when its last digit flickers.
+const WINDOW_COUNTS: f64 = 2.0;
+/// Longer than a shift: somebody has taken milliseconds for something else.
+const RUN_MAX_S: f64 = 8.0 * 3600.0;
+/// A target that is nearer to a calibrated position than this share of the step shows nothing between.
+const SAME_PLACE: f64 = 0.02;
+
+pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
+    for (name, axis) in &config.axis {
+        let judge = &mut Judge::at(format!("axis.{name}"), found);
+        check_window(judge, axis);
+        check_stopping(judge, axis);
+        check_timeout(judge, axis);
+        for stage in [Stage::Calibrate, Stage::Verify] {
+            check_duration(judge, axis, stage);
+        }
+        check_between(judge, axis);
+        check_corrections(found, config, (name, axis));
+    }
+}
+
+fn check_window(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    let counts = motion.position_window_um * 1e3 / motion.resolution_nm.abs();
+    if counts < WINDOW_COUNTS {
+        judge.say(
+            "position_window_um",
+            format!(
+                "{} µm are {:.1} counts of {} nm: an axis whose last digit flickers never stands",
+                Short(motion.position_window_um),
+                counts,
+                Short(motion.resolution_nm.abs())
+            ),
+            format!(
+                "give {} µm or more",
+                Short(WINDOW_COUNTS * motion.resolution_nm.abs() * 1e-3)
+            ),
+        );
+    }
+    let tolerance = axis.verify.as_ref().map(|it| it.accuracy_tolerance_um);
+    if let Some(tolerance) = tolerance.filter(|it| motion.position_window_um > *it) {
+        judge.say(
+            "position_window_um",
+            format!(
+                "the axis counts as there {} µm beside its target, and accuracy_tolerance_um is {}",
+                Short(motion.position_window_um),
+                Short(tolerance)
+            ),
+            "give a fraction of the tolerance",
+        );
+    }
+}
+
+fn check_stopping(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    let Some(zero) = &axis.zero else {
+        return;
+    };
+    let speed = motion.speed_mm_per_s;
+    let way = speed * speed / (2.0 * motion.quick_stop_deceleration_mm_per_s2);
+    let room = motion.soft_min_mm - zero.negative_limit_mm;
+    if way > room {
+        judge.say(
+            "quick_stop_deceleration_mm_per_s2",
+            format!(
+                "a quick stop from {} mm/s takes {way:.3} mm, and from soft_min_mm to the limit switch there are {} mm",
+                Short(speed),
+                Short(room)
+            ),
+            "raise it, lower speed_mm_per_s, or raise soft_min_mm",
+        );
+    }
+}
+
+fn check_timeout(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    let travel = motion.soft_max_mm - motion.soft_min_mm;
+    let speed = motion.speed_mm_per_s;
+    let least = travel / speed + speed / motion.acceleration_mm_per_s2;
+    if least > motion.move_timeout_s {
+        judge.say(
+            "move_timeout_s",
+            format!(
+                "a move over the whole travel of {} mm takes {least:.1} s at {} mm/s",
+                Short(travel),
+                Short(speed)
+            ),
+            format!("give more than {least:.0}, and time to settle"),
+        );
+    }
+}
+
+fn check_duration(judge: &mut Judge<'_>, axis: &AxisConfig, stage: Stage) {
+    let Some(plan) = plan_of(axis, stage) else {
+        return;
+    };
+    let planned = plan.planned(speed_of(axis));
+    if planned.at_least.as_secs_f64() > RUN_MAX_S {
+        judge.say(
+            match stage {
+                Stage::Calibrate => "calibrate.settle_ms",
+                _ => "verify.settle_ms",
+            },
+            format!(
+                "{} points take {} at least",
+                planned.points,
+                ShortSpan(planned.at_least)
+            ),
+            "check settle_ms, runs and the number of positions",
+        );
+    }
+}
+
+fn check_between(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let plans = [Stage::Calibrate, Stage::Verify].map(|it| plan_of(axis, it));
+    let [Some(calibrated), Some(verified)] = plans else {
+        return;
+    };
+    let same = verified.targets.iter();
+    let same = same.filter(|it| is_calibrated(&calibrated, **it)).count();
+    let all = verified.targets.len();
+    if 2 * same > all {
+        judge.say(
+            "verify.start_mm",
+            format!("{same} of {all} targets are calibrated positions: what is wrong between them does not show"),
+            "begin half a step beside a calibrated position, or take another number of targets",
+        );
+    }
+}
+
+fn is_calibrated(plan: &RunPlan, target: Metres) -> bool {
+    let steps = plan.targets.windows(2).map(|it| it[1] - it[0]);
+    let step = steps.fold(Metres(f64::INFINITY), Metres::min);
+    let near = |it: &Metres| (*it - target).abs() < step * SAME_PLACE;
+    plan.targets.iter().any(near)
+}
+
+/// Where the correction is switched off.
+fn check_corrections(
+    found: &mut Vec<Finding>,
+    config: &MachineConfig,
+    (name, axis): (&str, &AxisConfig),
+) {
+    let Some(plan) = plan_of(axis, Stage::Calibrate) else {
+        return;
+    };
+    let length = match plan.targets.as_slice() {
+        [first, .., last] => *last - *first,
+        _ => Metres::ZERO,
+    };
+    let instrument = config.instrument.get(&plan.instrument);
+    let off = instrument.into_iter().flat_map(|it| it.switched_off());
+    found.extend(off.map(|it| it.warned(&plan.instrument, &format!("axis {name}"), length)));
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::warnings::told::check;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+
+    #[test]
+    fn what_keeps_an_axis_from_standing_or_counts_anything_as_standing_is_told() {
+        let (key, from) = ("axis.x.position_window_um", "position_window_um = 0.05");
+        let says = "0.015 µm are 1.5 counts of 10 nm";
+        check(
+            LINEAR,
+            &[(from, "position_window_um = 0.015")],
+            &[key],
+            says,
+        );
+        let says = "3 µm beside its target, and accuracy_tolerance_um is 2";
+        check(LINEAR, &[(from, "position_window_um = 3.0")], &[key], says);
+    }
+
+    #[test]
+    fn ways_and_times_that_do_not_fit_are_told() {
+        let edit = [(
+            "quick_stop_deceleration_mm_per_s2 = 20000.0",
+            "quick_stop_deceleration_mm_per_s2 = 5000.0",
+        )];
+        let key = "axis.x.quick_stop_deceleration_mm_per_s2";
+        check(
+            LINEAR,
+            &edit,
+            &[key],
+            "takes 4.000 mm, and from soft_min_mm to the limit switch there are 3 mm",
+        );
+        let edit = [("move_timeout_s = 10.0", "move_timeout_s = 0.3")];
+        check(
+            LINEAR,
+            &edit,
+            &["axis.x.move_timeout_s"],
+            "66 mm takes 0.4 s at 200 mm/s",
+        );
+        let edit = [("settle_ms = 20", "settle_ms = 600000")];
+        check(
+            LINEAR,
+            &edit,
+            &["axis.x.calibrate.settle_ms"],
+            "126 points take 75600s at least",
+        );
+    }
+
+    #[test]
+    fn a_verification_at_calibrated_positions_is_told() {
+        let edits = [
+            ("start_mm = 1.7 ", "start_mm = 3.0 "),
+            ("end_mm = 58.7", "end_mm = 45.0"),
+        ];
+        let says = "8 of 8 targets are calibrated positions";
+        check(LINEAR, &edits, &["axis.x.verify.start_mm"], says);
+    }
+
+    #[test]
+    fn a_correction_that_is_missing_is_told_with_what_it_comes_to() {
+        let edits = [
+            ("correct_air = true", "correct_air = false"),
+            ("correct_dead_path = true", "correct_dead_path = false"),
+        ];
+        let key = |name: &str| format!("instrument.laser.{name}");
+        let (air, path) = (key("correct_air"), key("correct_dead_path"));
+        check(
+            LINEAR,
+            &edits[1..],
+            &[path.as_str()],
+            "NOT CORRECTED for dead path, they drift by 0.095 µm for each kelvin",
+        );
+        check(LINEAR, &edits, &[air.as_str(), path.as_str()], "dead path");
+    }
+}
