@@ -255,8 +255,7 @@ pub enum Failure {
     /// With its calibration the axis is worse than without; it is not used any more.
     #[error(
         "axis {axis}: CALIBRATION {calibration} MAKES THE AXIS WORSE: systematic deviation \
-         {:.3} µm with it, {:.3} µm when it was made; its sign, axis or place is wrong. It was \
-         taken out of use; {}",
+         {:.3} µm with it, {:.3} µm when it was made; {cause}. It was taken out of use; {}",
         after.um(), before.um(), in_use_text(in_use.as_deref())
     )]
     MadeWorse {
@@ -268,6 +267,8 @@ pub enum Failure {
         before: Metres,
         /// What there is with it.
         after: Metres,
+        /// What probably is wrong with it.
+        cause: String,
         /// The calibration that is used again.
         in_use: Option<String>,
     },

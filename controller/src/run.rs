@@ -17,6 +17,8 @@ pub struct CalibrateOptions {
     pub resume: Option<PathBuf>,
     /// Save although the closure error is above its limit.
     pub accept_drift: bool,
+    /// Store what is found, and go on using what was used before (linear axes).
+    pub aside: bool,
 }
 
 /// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.

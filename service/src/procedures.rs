@@ -55,6 +55,7 @@ fn calibrate(
     let options = CalibrateOptions {
         resume: task.resume.clone(),
         accept_drift: task.request.accept_drift,
+        ..CalibrateOptions::default()
     };
     let made = machine.linear(axis)?.calibrate(store, &options)?;
     let found = json!({

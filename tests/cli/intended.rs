@@ -52,6 +52,10 @@ fn each_verb_says_what_it_is_going_to_do() {
             "stored",
         ],
     );
+    let then = [&measured[..], &[("verify", "x")]].concat();
+    check(LINEAR, &["calibrate", "--verify"], &then);
+    let said = check(LINEAR, &["calibrate", "--no-activate"], &measured);
+    check_says(&said.to_string(), &["stored, and not used"]);
     let moved = [("zero", "x"), ("calibration", "x"), ("move", "x")];
     let said = check(LINEAR, &["move", "x=12.5mm", "--uncompensated"], &moved);
     check_says(

@@ -30,12 +30,25 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         let zero = bench.run(&["zero"]).with_code(0);
         assert_eq!(zero["axis"], "x");
 
-        let calibrated = bench.run(&["calibrate"]).with_code(0);
+        let calibrated = bench.run(&["calibrate", "--verify"]).with_code(0);
+        assert_eq!(calibrated["verified"]["within_tolerance"], true);
         let id = text(&calibrated["calibration"]);
         assert!(bench.folder().join(text(&calibrated["path"])).exists());
         let list = bench.run(&["cal", "list"]).with_code(0);
         assert_eq!(list["calibrations"][0]["id"], id);
         assert_eq!(list["calibrations"][0]["active"], true);
+
+        // Another one, to compare with: the first stays in use.
+        let aside = bench.run(&["calibrate", "--no-activate"]).with_code(0);
+        assert_eq!(aside["active"], false);
+        let words = [
+            "cal",
+            "diff",
+            "machine.toml",
+            id,
+            text(&aside["calibration"]),
+        ];
+        bench.run_plainly(&words).with_code(0);
 
         let verified = bench.run(&["verify"]).with_code(0);
         let accuracy = number(&verified["as_left"]["accuracy"]["bidirectional"]);

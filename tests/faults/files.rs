@@ -296,6 +296,7 @@ fn a_killed_run_goes_on_where_it_stopped() {
         let options = CalibrateOptions {
             resume,
             accept_drift: false,
+            ..CalibrateOptions::default()
         };
         machine.linear("x")?.calibrate(&store, &options)
     };

@@ -198,6 +198,10 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
             failure.to_string().contains("MAKES THE AXIS WORSE"),
             "{failure}"
         );
+        assert!(
+            failure.to_string().contains("its SIGN is wrong"),
+            "{failure}"
+        );
         let active = store.active("x").unwrap();
         assert_eq!(
             active.current.as_deref(),

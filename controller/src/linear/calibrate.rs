@@ -37,11 +37,13 @@ pub struct Calibrated {
     pub noticed: Option<Metres>,
     /// What makes the table uncertain.
     pub budget: AxisBudget,
+    /// Whether it is used from now on.
+    pub is_in_use: bool,
 }
 
 impl LinearStage<'_> {
     /// Measures the axis with its instrument, fits the table, stores and activates it, and
-    /// uses it from now on.
+    /// uses it from now on, unless it is to be kept aside.
     ///
     /// # Errors
     /// When the axis is not zeroed, anything stops the machine, the measurement drifted, or
@@ -82,12 +84,14 @@ impl LinearStage<'_> {
         let harmless = settings::harmless(self.core.config, self.axis);
         let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
         let id = store.save(&record)?;
-        store.activate(self.axis, &id)?;
-        self.use_calibration(Usable {
-            compensation,
-            budget: Some(budget.clone()),
-            approach: self.approach_length(),
-        });
+        if !options.aside {
+            store.activate(self.axis, &id)?;
+            self.use_calibration(Usable {
+                compensation,
+                budget: Some(budget.clone()),
+                approach: self.approach_length(),
+            });
+        }
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -97,6 +101,7 @@ impl LinearStage<'_> {
             measured,
             noticed,
             budget,
+            is_in_use: !options.aside,
         })
     }
 

@@ -39,6 +39,7 @@ mod told;
 mod travel;
 pub(crate) mod verify;
 mod warnings;
+mod worse;
 pub(crate) mod zero;
 
 // What users write; `tests/tidy/public_names.txt` lists it.

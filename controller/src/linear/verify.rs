@@ -12,6 +12,7 @@ use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
+use crate::linear::worse::likely_cause;
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
 use machine::Stage;
@@ -151,12 +152,14 @@ impl LinearStage<'_> {
         if verified.is_within_tolerance() || after <= before {
             return Ok(());
         }
+        let cause = likely_cause(compensation, &verified.figures);
         let in_use = self.fall_back(store, calibration)?;
         Err(Failure::MadeWorse {
             axis: self.axis.to_owned(),
             calibration: calibration.map_or_else(|| "in use".to_owned(), short),
             before,
             after,
+            cause,
             in_use: in_use.as_deref().map(short),
         })
     }

@@ -50,6 +50,8 @@ impl Service {
 
     pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
         refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
+        refuse(args.no_activate, "--no-activate")?;
+        refuse(args.verify, "--verify")?;
         refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});

@@ -54,6 +54,7 @@ use crate::{Agreed, Failure};
 use intended::Intent;
 use output::Output;
 use rotary::readings::ReadingsArgs;
+use volumetric::memory_args::MemoryCommand;
 
 /// What a shell script learns of an end: [`crate::Failure::exit_code`].
 const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
@@ -243,6 +244,12 @@ struct CalibrateArgs {
     ask: AskArgs,
     #[command(flatten)]
     readings: ReadingsArgs,
+    /// Store what is found, and use what was used before (linear axes).
+    #[arg(long, conflicts_with = "verify")]
+    no_activate: bool,
+    /// Verify with it at once, and go back to what was used before where it makes the axis worse (linear axes).
+    #[arg(long)]
+    verify: bool,
     /// Three axes: let them move to and fro for this long, then measure again what heat changed.
     #[arg(long, value_name = "MINUTES")]
     warm_up_min: Option<f64>,
@@ -262,60 +269,6 @@ struct VerifyArgs {
     ask: AskArgs,
     #[command(flatten)]
     readings: ReadingsArgs,
-}
-
-/// What is done with the state memories of three axes.
-#[derive(Debug, Subcommand)]
-enum MemoryCommand {
-    /// Zero, then record the present state at stops along each axis, before parts are made: from now
-    /// on all parts are made with it. Nothing is corrected while it is recorded, so it is not the state
-    /// in which an earlier part was made; `run --first-part` records that.
-    Record(MemoryArgs),
-    /// Keep a designed shape, from a file, as the state in which the machine was built (first). Nothing
-    /// moves, and the machine may be off.
-    Import(ImportArgs),
-    /// Forget a recorded state; parts are no longer made with it. Nothing moves.
-    Clear(MemoryArgs),
-}
-
-/// A designed shape, and of which machine.
-#[derive(Clone, Debug, Args)]
-struct ImportArgs {
-    /// The machine's configuration.
-    config: PathBuf,
-    /// Columns axis,along,position_mm,displacement_um: by how much the slide of an axis is to be displaced
-    /// along a direction across it, counted from the references of the detectors in use. With rolls the columns are
-    /// axis,along,position_mm,value,unit: unit is um, or arcsec where along is roll.
-    file: PathBuf,
-    /// Only the first: the second is the state of a part.
-    #[arg(long, value_enum, default_value_t = MemoryChoice::First)]
-    memory: MemoryChoice,
-}
-
-/// Which memory, of which machine.
-#[derive(Clone, Debug, Args)]
-struct MemoryArgs {
-    #[command(flatten)]
-    machine: MachineArgs,
-    /// The state in which the machine was built (first), or the state beyond it in which all parts
-    /// are to be made (second).
-    #[arg(long, value_enum, default_value_t = MemoryChoice::Second)]
-    memory: MemoryChoice,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MemoryChoice {
-    First,
-    Second,
-}
-
-impl From<MemoryChoice> for crate::volumetric::MemoryName {
-    fn from(choice: MemoryChoice) -> Self {
-        match choice {
-            MemoryChoice::First => Self::First,
-            MemoryChoice::Second => Self::Second,
-        }
-    }
 }
 
 /// Which way round a rotary axis goes.
@@ -367,6 +320,15 @@ impl AgreedArgs {
             uncompensated: self.uncompensated,
             beyond: self.beyond,
         }
+    }
+}
+
+impl CalibrateArgs {
+    /// # Errors
+    /// When a calibration of another kind is to be kept aside, or verified at once.
+    fn only_made(&self) -> Result<(), crate::Failure> {
+        only_for("--no-activate", "linear axes", self.no_activate)?;
+        only_for("--verify", "linear axes", self.verify)
     }
 }
 

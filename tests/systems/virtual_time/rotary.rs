@@ -389,6 +389,7 @@ fn check_nothing_stored(bench: &mut Bench, placements: usize) -> CalibrateOption
     CalibrateOptions {
         resume: Some(path),
         accept_drift: false,
+        ..CalibrateOptions::default()
     }
 }
 

@@ -147,6 +147,7 @@ fn a_table_read_on_two_days_is_as_right_and_its_verification_sees_the_places_bet
     let options = CalibrateOptions {
         resume,
         accept_drift: false,
+        ..CalibrateOptions::default()
     };
     person.goes_home_at = usize::MAX;
     let before = (person.hand.asked.len(), person.questions);

@@ -113,12 +113,25 @@ fn measured(
     let of_axis = &loaded.config.axis[&axis];
     let mut steps: Vec<Step> = zero_of(&axis, of_axis).into_iter().collect();
     steps.push(calibration(store, (&axis, &axis), intent)?);
-    steps.extend(run_of(&axis, of_axis, stage));
+    let (then, is_verified) = match intent {
+        Intent::Calibrate(args) if args.no_activate => {
+            ("; what was found is stored, and not used", false)
+        }
+        Intent::Calibrate(args) => (
+            "; what was found is stored and used from then on",
+            args.verify,
+        ),
+        Intent::Zero(_) | Intent::Verify(_) | Intent::Move(_) => ("", false),
+    };
+    steps.extend(run_of(&axis, of_axis, stage, then));
+    if is_verified {
+        steps.extend(run_of(&axis, of_axis, Stage::Verify, ""));
+    }
     Ok(steps)
 }
 
 /// The measuring run; `None` for an axis that is not configured for it, which its verb refuses.
-fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage) -> Option<Step> {
+fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage, then: &str) -> Option<Step> {
     let plan = plan_of(of_axis, stage)?;
     let speed = speed_of(of_axis);
     let planned = plan.planned(speed);
@@ -136,7 +149,7 @@ fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage) -> Option<Step> {
     );
     let what = match stage {
         Stage::Calibrate => {
-            text += "; what was found is stored and used from then on";
+            text += then;
             "calibrate"
         }
         _ => {

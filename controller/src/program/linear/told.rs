@@ -74,8 +74,15 @@ pub(crate) fn calibrated(calibrated: &Calibrated) -> Told {
 
 pub(crate) fn calibrated_text(calibrated: &Calibrated) -> String {
     let fitted = &calibrated.fitted;
+    let state = match calibrated.is_in_use {
+        true => "stored and activated".to_owned(),
+        false => format!(
+            "stored, NOT IN USE: compare it with `truestage cal diff`, use it with `truestage cal activate {}`",
+            &calibrated.id[..12]
+        ),
+    };
     let mut text = format!(
-        "calibration {} stored and activated\n  {} positions, largest deviation {:.3} µm, {}\n  {}\n  \
+        "calibration {} {state}\n  {} positions, largest deviation {:.3} µm, {}\n  {}\n  \
          points in {}",
         &calibrated.id[..12],
         fitted.table.nodes().len(),
@@ -107,6 +114,7 @@ pub(crate) fn calibrated_value(calibrated: &Calibrated) -> Value {
     let budget = calibrated.record.content.budget.as_ref();
     json!({
         "calibration": calibrated.id,
+        "active": calibrated.is_in_use,
         "path": calibrated.path,
         "journal": calibrated.journal,
         "closure_um": calibrated.measured.closure.map(to_json::um),

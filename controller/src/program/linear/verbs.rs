@@ -6,8 +6,8 @@ use machine::records::Store;
 use serde_json::{Value, json};
 use units::Metres;
 
-use crate::linear::VerifyOptions;
 use crate::linear::settings::require_within;
+use crate::linear::{Told, Verified, VerifyOptions};
 use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::linear::{gantry, moved, told};
@@ -92,21 +92,50 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     args.readings.refuse()?;
-    let (calibrated, counters) = with_zeroed_axis(
-        &args.axis,
-        "calibrate",
-        output,
-        false,
-        args.resume.as_ref(),
-        |machine, axis, store, prepared| {
-            let options = CalibrateOptions {
-                resume: prepared.resume,
-                accept_drift: args.accept_drift,
-            };
-            machine.linear(axis)?.calibrate(store, &options)
-        },
-    )?;
-    output.told(told::calibrated(&calibrated), counters)
+    let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
+        let options = CalibrateOptions {
+            resume: prepared.resume,
+            accept_drift: args.accept_drift,
+            aside: args.no_activate,
+        };
+        let calibrated = machine.linear(axis)?.calibrate(store, &options)?;
+        let verified = match args.verify {
+            true => Some(machine.linear(axis)?.verify(
+                store,
+                &VerifyOptions {
+                    compensated: true,
+                    calibration: Some(calibrated.id.clone()),
+                    resume: None,
+                },
+            )?),
+            false => None,
+        };
+        Ok((axis.to_owned(), calibrated, verified))
+    };
+    let resume = args.resume.as_ref();
+    let made = with_zeroed_axis(&args.axis, "calibrate", output, false, resume, run)?;
+    let ((axis, calibrated, verified), counters) = made;
+    let mut told = told::calibrated(&calibrated);
+    let Some(verified) = verified else {
+        return output.told(told, counters);
+    };
+    let then = told::verified(&axis, &verified, true);
+    told.text += &format!("\n{}", then.text);
+    told.value["verified"] = then.value;
+    judged(&axis, &verified, told, counters, output)
+}
+
+/// What was verified as left, and whether it is within the tolerance.
+fn judged(axis: &str, verified: &Verified, told: Told, counters: Value, output: Output) -> Ended {
+    if verified.is_within_tolerance() {
+        return output.told(told, counters);
+    }
+    let failure = Failure::OutOfTolerance {
+        axis: axis.to_owned(),
+        seen: verified.figures.accuracy.bidirectional,
+        limit: verified.tolerance,
+    };
+    output.bad_result(&told.text, with_counters(told.value, counters), failure)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
@@ -132,13 +161,10 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         run,
     )?;
     let told = told::verified(&axis, &verified, compensated);
-    if compensated && !verified.is_within_tolerance() {
-        let seen = verified.figures.accuracy.bidirectional;
-        let limit = verified.tolerance;
-        let failure = Failure::OutOfTolerance { axis, seen, limit };
-        return output.bad_result(&told.text, with_counters(told.value, counters), failure);
+    match compensated {
+        true => judged(&axis, &verified, told, counters, output),
+        false => output.told(told, counters),
     }
-    output.told(told, counters)
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {

@@ -89,6 +89,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.only_made()?;
     args.readings.refuse()?;
     whole_only(&args.axis)?;
     never_resumed(args.resume.is_some())?;

@@ -163,6 +163,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let options = CalibrateOptions {
         resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
         accept_drift: args.accept_drift,
+        ..CalibrateOptions::default()
     };
     let resumed = options.resume.as_deref();
     let progress = resumable(store, "calibrate", axis, resumed, || {

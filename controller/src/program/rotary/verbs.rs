@@ -56,6 +56,7 @@ enum Reader {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.only_made()?;
     let mut operator = match ReadBy::of(&args.axis, &args.readings)? {
         ReadBy::Detector => Reader::Detector(Terminal::new(
             args.ask.yes,
@@ -69,6 +70,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         let options = CalibrateOptions {
             resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
             accept_drift: args.accept_drift,
+            ..CalibrateOptions::default()
         };
         let resumed = options.resume.clone();
         resumable(store, "calibrate", axis, resumed.as_deref(), || {

@@ -11,12 +11,13 @@ use units::Metres;
 
 use crate::config;
 use crate::ports::Use;
+use crate::program::MachineArgs;
 use crate::program::data_file::{read, volume_head_of};
 use crate::program::intended::nowhere;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
+use crate::program::volumetric::memory_args::{ImportArgs, MemoryArgs};
 use crate::program::volumetric::verbs::{never_measured, with_zeroed_volume, zeroed_volume};
-use crate::program::{ImportArgs, MachineArgs, MemoryArgs};
 use crate::volumetric::MemoryName;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::failure::PathRefusal;

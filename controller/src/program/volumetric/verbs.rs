@@ -77,6 +77,7 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    args.only_made()?;
     args.readings.refuse()?;
     if args.accept_drift {
         return Err(Failure::Usage {

@@ -269,6 +269,7 @@ fn imported(
     let options = CalibrateOptions {
         resume: resume.map(|it| it.journal.clone()),
         accept_drift: false,
+        ..CalibrateOptions::default()
     };
     calibrate(subject(loaded), store, &options, Source::Files(files))
 }
@@ -291,6 +292,7 @@ fn resume(store: &Store) -> CalibrateOptions {
     CalibrateOptions {
         resume: store.newest_run("calibrate", "c").unwrap(),
         accept_drift: false,
+        ..CalibrateOptions::default()
     }
 }
 

@@ -1,0 +1,105 @@
+//! Why a calibration makes an axis worse: by how what is left looks like what the calibration takes away.
+
+use compensator::error_table::Compensation;
+use compensator::iso230::Figures;
+use units::{Approach, Metres};
+
+/// So alike two curves are one and the same, but for a factor.
+const ALIKE: f64 = 0.95;
+
+/// What probably is wrong, for a person.
+pub(super) fn likely_cause(used: &Compensation, left: &Figures) -> String {
+    let pairs = left.targets.iter().flat_map(|it| {
+        let sides = [
+            (Approach::Forward, it.mean_forward),
+            (Approach::Reverse, it.mean_reverse),
+        ];
+        sides.map(|(approach, seen)| Some((used.deviation(it.target, approach).ok()?, seen)))
+    });
+    told(likeness(&pairs.flatten().collect::<Vec<_>>()))
+}
+
+/// By which factor what is left follows what the calibration says, and how closely (their correlation); `None` where
+/// either has no shape.
+fn likeness(pairs: &[(Metres, Metres)]) -> Option<(f64, f64)> {
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(Metres, Metres)) -> Metres| {
+        pairs.iter().map(|it| of(it).value()).sum::<f64>() / count
+    };
+    let (used, left) = (mean(|it| it.0), mean(|it| it.1));
+    let (mut of_used, mut of_left, mut of_both) = (0.0, 0.0, 0.0);
+    for pair in pairs {
+        let (x, y) = (pair.0.value() - used, pair.1.value() - left);
+        of_used += x * x;
+        of_left += y * y;
+        of_both += x * y;
+    }
+    let correlation = of_both / (of_used * of_left).sqrt();
+    correlation
+        .is_finite()
+        .then_some((of_both / of_used, correlation))
+}
+
+/// With a right calibration nothing of it is left (factor 0). One with the wrong sign leaves twice the deviation, −2 of
+/// what it says; one of deviations that the axis has not leaves these, −1; one in too small a unit leaves them nearly
+/// whole, many times what it says.
+fn told(likeness: Option<(f64, f64)>) -> String {
+    let follows = likeness.filter(|(_, correlation)| correlation.abs() > ALIKE);
+    match follows.map(|(factor, _)| factor) {
+        Some(-2.5..=-1.5) => "what is left is twice what it takes away: its SIGN is wrong, or the axis or the \
+                              instrument counts the other way round"
+            .into(),
+        Some(-1.3..=-0.7) => "what is left is what it takes away: the axis has no such deviations. It is of ANOTHER \
+                              stage or axis, or in a unit that is too large (mm for inch)"
+            .into(),
+        Some(factor @ 3.0..) => format!(
+            "what is left is {factor:.0} times what it takes away: it is in a UNIT that is too small (inch for mm, \
+             µm for mm)"
+        ),
+        _ => "what is left does not look like what it takes away: it is of another place, axis or stage, or the \
+              stage has changed since"
+            .into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The deviations of a stage, by its places.
+    fn curve(at: u32) -> f64 {
+        let x = f64::from(at);
+        3.0 * (x / 3.0).sin() + 0.2 * x
+    }
+
+    /// What is told of a table that says `says` of each place, on the stage above.
+    #[track_caller]
+    fn check(says: impl Fn(u32) -> f64, cause: &str) {
+        let pairs = (0..20).map(|at| {
+            let noise = 0.05 * (f64::from(at * 7919 % 11) - 5.0);
+            let (used, left) = (says(at), curve(at) - says(at) + noise);
+            (Metres::from_um(used), Metres::from_um(left))
+        });
+        let told = told(likeness(&pairs.collect::<Vec<_>>()));
+        assert!(told.contains(cause), "{told}");
+    }
+
+    #[test]
+    fn a_wrong_sign_unit_or_stage_is_told_by_what_is_left() {
+        check(|at| -curve(at), "its SIGN is wrong");
+        check(
+            |at| 25.4 * curve(at),
+            "of ANOTHER stage or axis, or in a unit that is too large",
+        );
+        check(
+            |at| curve(at) / 25.4,
+            "24 times what it takes away: it is in a UNIT that is too small",
+        );
+        check(
+            |at| 30.0 * (f64::from(at) / 2.0).cos(),
+            "of ANOTHER stage or axis",
+        );
+        check(|at| 3.0 * (1.7 * f64::from(at)).cos(), "does not look like");
+        assert!(told(None).contains("does not look like"));
+    }
+}
