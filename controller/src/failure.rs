@@ -341,6 +341,12 @@ pub enum Failure {
         /// How many.
         wrong: usize,
     },
+    /// Something stands between this computer and the machine.
+    #[error("{} must be put right first", units::Several(*wrong, "check"))]
+    Unfit {
+        /// How many checks failed.
+        wrong: usize,
+    },
     /// The result is out of tolerance.
     #[error(
         "axis {axis}: bidirectional accuracy A = {:.3} µm, the tolerance is {:.3} µm",

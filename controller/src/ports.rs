@@ -172,7 +172,7 @@ pub fn open(
 }
 
 /// Where each bus and line that `purpose` needs is found.
-fn endpoints(
+pub(crate) fn endpoints(
     config: &MachineConfig,
     overrides: &Overrides,
     purpose: Use,

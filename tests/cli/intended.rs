@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use nix::pty::openpty;
 use serde_json::Value;
-use tests::{Edit, LINEAR, ROTARY, Shipped, UVW, VOLUMETRIC};
+use tests::{Edit, GANTRY, LINEAR, ROTARY, Shipped, UVW, VOLUMETRIC};
 
 use crate::programs::{check_says, program, text, truestage};
 
@@ -41,6 +41,12 @@ fn check(shipped: Shipped, words: &[&str], expected: &[(&str, &str)]) -> Value {
 #[test]
 fn each_verb_says_what_it_is_going_to_do() {
     check(LINEAR, &["zero"], &[("zero", "x")]);
+    let both = [("zero", "beam"), ("zero", "x1"), ("zero", "x2")];
+    let said = check(GANTRY, &["zero"], &both);
+    check_says(
+        &said.to_string(),
+        &["x1 and x2 together to their negative limit switches"],
+    );
     let measured = [("zero", "x"), ("calibration", "x"), ("calibrate", "x")];
     let said = check(LINEAR, &["calibrate"], &measured);
     check_says(
@@ -80,7 +86,7 @@ fn each_verb_says_what_it_is_going_to_do() {
         ("calibration", "w"),
     ];
     let steps = [&[whole][..], &screws, &[("verify", "platform")]].concat();
-    check(UVW, &["verify"], &steps);
+    check(UVW, &["verify", "--uncompensated"], &steps);
     let steps = [&[whole][..], &screws, &[("move", "platform")]].concat();
     let said = check(UVW, &["move", "x=1mm", "--uncompensated"], &steps);
     check_says(
@@ -114,6 +120,23 @@ fn what_the_verb_would_refuse_is_refused() {
     let words = ["move", "x=99mm", "--uncompensated", "--dry-run"];
     refused(LINEAR, &words, 3, "soft limits");
     refused(LINEAR, &["move", "y=1mm", "--dry-run"], 2, "no axis `y`");
+    let words = ["zero", "--axis", "x1", "--dry-run"];
+    refused(GANTRY, &words, 2, "a side of the gantry beam");
+    let words = ["calibrate", "--no-activate", "--dry-run"];
+    refused(UVW, &words, 2, "--no-activate is for linear axes");
+    let words = ["calibrate", "--axis", "u", "--dry-run"];
+    refused(UVW, &words, 2, "part of a platform");
+    refused(UVW, &["verify", "--dry-run"], 3, "without a calibration");
+    refused(
+        VOLUMETRIC,
+        &["verify", "--resume", "--dry-run"],
+        2,
+        "cannot be resumed",
+    );
+    let words = ["calibrate", "--warm-up-min=-5", "--dry-run"];
+    refused(VOLUMETRIC, &words, 2, "--warm-up-min is -5");
+    let words = ["move", "x=1mm", "--way", "forward", "--dry-run"];
+    refused(LINEAR, &words, 2, "--way is for rotary axes");
     refused(LINEAR, &["verify", "--dry-run"], 2, "no active calibration");
     refused(
         ROTARY,
@@ -184,10 +207,32 @@ fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (String, Option
     (String::from_utf8_lossy(&seen).into_owned(), code)
 }
 
+/// An adapter that is not there.
+fn without_adapter() -> tempfile::TempDir {
+    let absent = "path = \"/dev/no-such-adapter\"";
+    desk(LINEAR, |text| text.edit("path = \"/dev/ttyACM1\"", absent))
+}
+
+#[test]
+fn what_is_missing_is_told_with_what_to_do() {
+    let folder = without_adapter();
+    let said = truestage(folder.path(), &["doctor"]).with_code(4);
+    assert_eq!(said["sound"], false);
+    let checks = said["checks"].as_array().expect("a list of checks");
+    let bus = checks.iter().find(|it| it["subject"] == "can0");
+    let bus = bus.expect("the bus is checked");
+    assert_eq!(bus["verdict"], "bad", "{said:#}");
+    check_says(text(&bus["seen"]), &["no-such-adapter"]);
+    check_says(text(&bus["fix"]), &["plug it in"]);
+    assert!(
+        !folder.path().join("machine-data").exists(),
+        "nothing is written"
+    );
+}
+
 #[test]
 fn a_person_is_asked_and_a_script_is_not() {
-    let absent = "path = \"/dev/no-such-adapter\"";
-    let folder = desk(LINEAR, |text| text.edit("path = \"/dev/ttyACM1\"", absent));
+    let folder = without_adapter();
     let (seen, code) = at_a_terminal(folder.path(), &["zero"], "n\n");
     check_says(
         &seen,

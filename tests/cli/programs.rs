@@ -325,6 +325,7 @@ impl Bench {
         command.args(&words[..verb]);
         let uses_machine = [
             "scan",
+            "doctor",
             "zero",
             "calibrate",
             "verify",

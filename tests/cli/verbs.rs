@@ -23,6 +23,8 @@ fn text(value: &Value) -> &str {
 fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
+        let doctor = bench.run(&["doctor"]).with_code(0);
+        assert_eq!(doctor["sound"], true, "{doctor:#}");
         let scan = bench.run(&["scan"]).with_code(0);
         assert_eq!(scan["matches"], true);
         assert!(scan["devices"].as_array().is_some_and(|it| it.len() >= 2));

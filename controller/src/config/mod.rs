@@ -9,6 +9,7 @@ mod diagnostic;
 #[cfg(test)]
 mod impossible_tests;
 pub(crate) mod judge;
+pub(crate) mod least_time;
 mod load;
 mod model;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod reference;
 pub(crate) mod schema;
 mod structure;
 mod syntax;
+mod unit;
 pub(crate) mod validate;
 pub(crate) mod warnings;
 

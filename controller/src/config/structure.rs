@@ -8,6 +8,7 @@ use units::Short;
 
 use super::judge::Finding;
 use super::schema::{DEVICE, type_of, without_null};
+use super::unit::{is_unit, split_unit};
 
 /// What is wrong with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,13 +132,15 @@ fn correction(expected: &str, value: &Value) -> String {
     }
 }
 
-/// The number that a text begins with, whatever follows.
+/// The number of a text that is one, with a unit or without.
 fn number_in(text: &str) -> Option<&str> {
     let text = text.trim();
-    let is_digit = |it: char| it.is_ascii_digit() || "+-._eE".contains(it);
-    let end = text.find(|it| !is_digit(it)).unwrap_or(text.len());
-    let number = &text[..end];
-    number.parse::<f64>().is_ok().then_some(number)
+    let digits = text.strip_prefix("0x").unwrap_or_default();
+    if !digits.is_empty() && digits.chars().all(|it| it.is_ascii_hexdigit() || it == '_') {
+        return Some(text);
+    }
+    let (number, unit) = split_unit(text)?;
+    unit.is_none_or(is_unit).then_some(number)
 }
 
 fn table(path: &str, seen: &Table, schema: &Schema, findings: &mut Findings) {

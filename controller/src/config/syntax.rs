@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use super::judge::Finding;
+use super::unit::{is_unit, split_unit};
 
 /// What a TOML reader says of a second key, or of a second section.
 const TWICE: &str = "duplicate key";
@@ -68,30 +69,38 @@ impl<'a> Place<'a> {
     /// `12.5 mm` in place of a number.
     fn with_a_unit(&self) -> Option<Finding> {
         let value = self.value()?;
-        let end = value.find(|it: char| !(it.is_ascii_digit() || "+-._eE".contains(it)))?;
-        let (number, unit) = value.split_at(end);
-        number.parse::<f64>().ok()?;
-        let unit = unit.trim();
-        unit.chars()
-            .all(|it| it.is_alphabetic() || "/°²³%″′0123456789".contains(it))
-            .then(|| Finding {
-                key: self.key(),
-                cause: format!("`{value}` is no number: the unit is in the key's name"),
-                help: format!(
-                    "write {number} without `{unit}`, in the unit that the key ends with"
-                ),
-            })
+        let (number, unit) = split_unit(value)?;
+        let unit = unit.filter(|it| is_unit(it))?;
+        Some(Finding {
+            key: self.key(),
+            cause: format!("`{value}` is no number: the unit is in the key's name"),
+            help: format!("write {number} without `{unit}`, in the unit that the key ends with"),
+        })
     }
 
     /// A word that is no number and no `true` or `false`.
     fn without_quotes(&self) -> Option<Finding> {
         let value = self.value()?;
         let is_word = value.starts_with(|it: char| it.is_alphabetic() || "/.~".contains(it));
-        (is_word && !value.contains('"')).then(|| Finding {
-            key: self.key(),
-            cause: format!("`{value}` is text without quotes"),
-            help: format!("write it in quotes: \"{value}\""),
-        })
+        if !is_word || value.contains('"') {
+            return None;
+        }
+        let key = self.key();
+        let told = |cause: String, help: String| Some(Finding { key, cause, help });
+        match value.to_lowercase().as_str() {
+            "true" | "yes" | "on" => told(
+                format!("`{value}` is not known here"),
+                "write true, in small letters".into(),
+            ),
+            "false" | "no" | "off" => told(
+                format!("`{value}` is not known here"),
+                "write false, in small letters".into(),
+            ),
+            _ => told(
+                format!("`{value}` is text without quotes"),
+                format!("write it in quotes: \"{value}\""),
+            ),
+        }
     }
 
     /// Where the same key, or the same section, stands before.
@@ -102,33 +111,40 @@ impl<'a> Place<'a> {
             false => self.line.split_once('=')?.0.trim(),
         };
         let mut section = "";
+        let mut first = None;
         for (number, line) in text.lines().map(str::trim).enumerate().take(self.number) {
             if is_header(line) {
                 section = line;
+                // Each section of a list is another one.
+                first = first.filter(|_| !(line.starts_with("[[") && line == self.section));
             }
             let seen = match (is_section, line.split_once('=')) {
                 (true, _) if is_header(line) => name_of(line),
                 (false, Some((key, _))) if section == self.section => key.trim(),
                 _ => continue,
             };
-            if seen == wanted {
-                let what = if is_section { "the section" } else { "the key" };
-                return Some(Finding {
-                    key: self.key(),
-                    cause: format!(
-                        "{what} stands here a second time; line {} has it first",
-                        number + 1
-                    ),
-                    help: "leave one of them out".into(),
-                });
+            if seen == wanted && first.is_none() {
+                first = Some(number + 1);
             }
         }
-        None
+        let what = if is_section { "the section" } else { "the key" };
+        Some(Finding {
+            key: self.key(),
+            cause: format!(
+                "{what} stands here a second time; line {} has it first",
+                first?
+            ),
+            help: "leave one of them out".into(),
+        })
     }
 }
 
+/// `[axis.x]`, and no line of a list over several lines.
 fn is_header(line: &str) -> bool {
-    line.starts_with('[')
+    let name = name_of(line);
+    let is_name = |it: char| it.is_alphanumeric() || "_.-\"' ".contains(it);
+    let is_list = name.starts_with(|it: char| it.is_ascii_digit() || it == '-');
+    line.starts_with('[') && !name.is_empty() && !is_list && name.chars().all(is_name)
 }
 
 /// `axis.x` of `[axis.x]`, with whatever comment.
@@ -196,6 +212,40 @@ mod tests {
             "axis.x.calibrate",
             says,
         );
+    }
+
+    #[test]
+    fn a_number_or_a_word_that_is_nearly_right_is_told_as_what_it_is() {
+        let (from, key) = ("correct_air = true", "instrument.laser.correct_air");
+        check(from, "correct_air = True", key, ["`True`", "write true"]);
+        check(from, "correct_air = off", key, ["`off`", "write false"]);
+        let from = "device_type = 0x00020192";
+        let key = "axis.x.identity.device_type";
+        check(from, "device_type = 0x0002019G", key, ["", "`key = value`"]);
+    }
+
+    #[test]
+    fn in_a_list_of_sections_the_same_section_is_searched() {
+        const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+        let third = UVW.rfind("lead_mm").expect("it is there");
+        let text = format!("{}lead_mm = 2.0\n{}", &UVW[..third], &UVW[third..]);
+        let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+            panic!("it stands there twice")
+        };
+        let first = text[..third].matches('\n').count() + 1;
+        assert!(
+            findings[0]
+                .cause
+                .contains(&format!("line {first} has it first")),
+            "{findings:?}"
+        );
+    }
+
+    #[test]
+    fn a_list_over_several_lines_is_no_section() {
+        let from = "channels = [0, 1] ";
+        let to = "channels = [\n  0,\n  1\n]\nnoise = [\n  [1.0, 2.0],\n]\nx = 5 mm #";
+        check(from, to, "analog.hall.x", ["`5 mm`", "write 5"]);
     }
 
     #[test]

@@ -45,7 +45,8 @@ impl Failure {
             | Self::InputNotSeen { .. }
             | Self::Search { .. }
             | Self::Correction { .. }
-            | Self::ScanMismatch { .. } => 4,
+            | Self::ScanMismatch { .. }
+            | Self::Unfit { .. } => 4,
             Self::ZeroUncertain { .. }
             | Self::Refine { .. }
             | Self::Closure { .. }

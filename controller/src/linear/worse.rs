@@ -50,11 +50,11 @@ fn told(likeness: Option<(f64, f64)>) -> String {
                               instrument counts the other way round"
             .into(),
         Some(-1.3..=-0.7) => "what is left is what it takes away: the axis has no such deviations. It is of ANOTHER \
-                              stage or axis, or in a unit that is too large (mm for inch)"
+                              stage or axis, or in a unit that is too large (mm taken for inches, µm for mm)"
             .into(),
         Some(factor @ 3.0..) => format!(
-            "what is left is {factor:.0} times what it takes away: it is in a UNIT that is too small (inch for mm, \
-             µm for mm)"
+            "what is left is {factor:.0} times what it takes away: it is in a UNIT that is too small (inches taken for \
+             mm, mm for µm)"
         ),
         _ => "what is left does not look like what it takes away: it is of another place, axis or stage, or the \
               stage has changed since"

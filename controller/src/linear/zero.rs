@@ -17,6 +17,7 @@ use drivers::device::{AxisCommand, DriveCommand};
 use units::{Metres, MetresPerSecond, Volts};
 
 use crate::assemble;
+use crate::config::MachineConfig;
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::homing;
@@ -89,18 +90,9 @@ impl LinearStage<'_> {
         self.zero_from(store, Begins::Anywhere)
     }
 
-    /// Refuses a side of a gantry, which goes nowhere far by itself.
+    /// Refuses a side of a gantry.
     pub(super) fn require_alone(&self) -> Result<(), Failure> {
-        let Some((name, _)) = gantry_of(self.core.config, self.axis) else {
-            return Ok(());
-        };
-        Err(Failure::Usage {
-            what: format!(
-                "axis {} is a side of the gantry {name}, which it would turn on its way; nothing was moved",
-                self.axis
-            ),
-            help: format!("zero both sides together: `truestage zero --axis {name}`"),
-        })
+        require_alone(self.core.config, self.axis)
     }
 
     /// The same of an axis that may be at its nominal zero already.
@@ -334,6 +326,19 @@ impl LinearStage<'_> {
             approach_m: None,
         }
     }
+}
+
+/// Refuses a side of a gantry, which goes nowhere far by itself.
+pub(crate) fn require_alone(config: &MachineConfig, axis: &str) -> Result<(), Failure> {
+    let Some((name, _)) = gantry_of(config, axis) else {
+        return Ok(());
+    };
+    Err(Failure::Usage {
+        what: format!(
+            "axis {axis} is a side of the gantry {name}, which it would turn on its way; nothing was moved"
+        ),
+        help: format!("zero both sides together: `truestage zero --axis {name}`"),
+    })
 }
 
 /// The way to the negative limit switch, which becomes the nominal place that `config` gives it.

@@ -17,16 +17,17 @@ use crate::program::verbs::Verbs;
 /// keeps the machine.
 pub(crate) fn run(intent: Intent<'_>, output: Output) -> Ended {
     let ended = by_kind(intent.machine(), intent.named().into_iter(), |kind| {
+        (kind.refuse)(intent)?;
+        let loaded = config::load(&intent.machine().config)?;
+        let steps = steps(kind, &loaded, intent)?;
         let ask = intent.ask();
         if ask.dry_run {
-            let loaded = config::load(&intent.machine().config)?;
-            let steps = steps(kind, &loaded, intent)?;
             return output.result(&told(&loaded, &steps), &value(&loaded, &steps));
         }
-        if !ask.yes && stdin().is_terminal() && stderr().is_terminal() {
-            let loaded = config::load(&intent.machine().config)?;
-            output.note(&told(&loaded, &steps(kind, &loaded, intent)?));
-            if is_kept(&loaded) {
+        let is_asked = stdin().is_terminal() && stderr().is_terminal();
+        if !ask.yes && is_asked && steps.iter().any(Step::moves) {
+            output.note(&told(&loaded, &steps));
+            if is_kept(&loaded) && !matches!(intent, Intent::Zero(_)) {
                 output
                     .note("  a service keeps this machine: what has its zero is not zeroed again");
             }
@@ -37,9 +38,10 @@ pub(crate) fn run(intent: Intent<'_>, output: Output) -> Ended {
     kept::or_by_its_service(ended, |service| there(intent, service, output))
 }
 
-/// Whether another program has the machine.
+/// Whether a service has the machine.
 fn is_kept(loaded: &Loaded) -> bool {
-    Lease::take(&loaded.config.machine.store(), "ask").is_err()
+    let owner = Lease::owner(&loaded.config.machine.store());
+    owner.is_some_and(|(_, places)| !places.is_empty())
 }
 
 fn steps(kind: &Verbs, loaded: &Loaded, intent: Intent<'_>) -> Result<Vec<Step>, Failure> {

@@ -8,6 +8,7 @@ mod check;
 mod data;
 mod data_file;
 mod demo;
+mod doctor;
 mod exchange;
 mod explain;
 mod intended;
@@ -82,6 +83,9 @@ enum Command {
         #[arg(default_value = "machine.toml")]
         config: PathBuf,
     },
+    /// Check what stands between this computer and the machine: ports, rights, queues, records, other masters on a
+    /// bus; a line for each, with what to do. Nothing is sent to any device.
+    Doctor(MachineArgs),
     /// List the devices on the buses and what does not match the configuration; nothing changes.
     Scan(MachineArgs),
     /// Acknowledge the fault of a drive, once; nothing moves.
@@ -409,6 +413,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>, version: &'static s
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args, output),
         Command::Check { config } => check::run(&config, output),
+        Command::Doctor(args) => doctor::run(&args, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => reset::run(&args, output),
         Command::Zero(args) => before::run(Intent::Zero(&args), output),

@@ -24,6 +24,8 @@ pub(crate) struct Verbs {
     pub(crate) made_together: fn(&MachineConfig, &str) -> Option<Vec<String>>,
     /// Its demonstrations.
     pub(crate) demos: &'static [Demo],
+    /// Words that it has no use for.
+    pub(crate) refuse: fn(Intent<'_>) -> Result<(), Failure>,
     /// What a verb is going to do; refuses what can be told before the machine is connected.
     pub(crate) intended: fn(&Loaded, &Store, Intent<'_>) -> Result<Vec<Step>, Failure>,
     pub(crate) zero: fn(&AxisArgs, Output) -> Ended,

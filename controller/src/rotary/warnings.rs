@@ -4,6 +4,7 @@ use units::Short;
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
+use crate::config::least_time::least_time;
 use crate::rotary::RotaryConfig;
 
 const TURN_ARCSEC: f64 = 1_296_000.0;
@@ -49,7 +50,7 @@ fn check_window(judge: &mut Judge<'_>, table: &RotaryConfig) {
 
 fn check_timeout(judge: &mut Judge<'_>, table: &RotaryConfig) {
     let speed = table.speed_deg_per_s;
-    let least = 360.0 / speed + speed / table.acceleration_deg_per_s2;
+    let least = least_time(360.0, speed, table.acceleration_deg_per_s2);
     if least > table.move_timeout_s {
         judge.say(
             "move_timeout_s",

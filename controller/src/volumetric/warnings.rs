@@ -4,9 +4,7 @@ use units::Metres;
 
 use crate::config::MachineConfig;
 use crate::config::judge::Finding;
-
-/// What reads lines reads the machine as warm as it is; thermometers do the rest.
-const NOT_OF_LINES: &str = "correct_material";
+use crate::hardware::instrument::NOT_OF_LINES;
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(volume) = &config.volumetric else {
@@ -44,11 +42,6 @@ mod tests {
             &[path.as_str()],
             "drift by 0.048 µm",
         );
-        check(
-            VOLUMETRIC,
-            &edits,
-            &[air.as_str(), path.as_str()],
-            "dead path",
-        );
+        check(VOLUMETRIC, &edits, &[air.as_str()], "NOT CORRECTED for air");
     }
 }

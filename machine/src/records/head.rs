@@ -158,6 +158,14 @@ pub struct InstrumentRecord {
 }
 
 impl InstrumentRecord {
+    /// Without what follows from the rest, which earlier programs did not write.
+    pub(super) fn corrections(&self) -> Self {
+        Self {
+            switched_off: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// That corrections were switched off, in capitals; `None` where none was.
     pub fn warning(&self) -> Option<String> {
         (!self.switched_off.is_empty())

@@ -321,7 +321,7 @@ fn same_run(
         ),
         (
             "instrument and its corrections",
-            first_difference(&old.instrument, &new.instrument),
+            first_difference(&old.instrument.corrections(), &new.instrument.corrections()),
         ),
         ("number of runs", first_difference(&old.runs, &new.runs)),
         ("targets", first_difference(&old.targets_m, &new.targets_m)),

@@ -52,20 +52,18 @@ impl Lease {
                 Ok(Self { lock })
             }
             Err((mut file, _)) => {
-                let mut said = String::new();
-                // Who holds it is a courtesy; that it is held is the fact.
-                let _ = file.rewind().and_then(|()| file.read_to_string(&mut said));
-                let (owner, places) = said.split_once('\n').unwrap_or((&said, ""));
-                let places = places.lines().filter_map(|it| it.strip_prefix(PLACE));
-                let owner = match owner.trim() {
-                    "" => "a program that has just begun",
-                    owner => owner,
-                };
-                Err(StoreError::Leased {
-                    owner: owner.to_owned(),
-                    places: places.map(str::to_owned).collect(),
-                })
+                let (owner, places) = said_in(&mut file);
+                Err(StoreError::Leased { owner, places })
             }
+        }
+    }
+
+    /// Who has the machine, and where its owner can be asked; `None` when nobody has it. Nothing is made or written.
+    pub fn owner(store: &Store) -> Option<(String, Vec<String>)> {
+        let file = File::open(store.root().join("lease")).ok()?;
+        match Flock::lock(file, FlockArg::LockSharedNonblock) {
+            Ok(_) => None,
+            Err((mut file, _)) => Some(said_in(&mut file)),
         }
     }
 
@@ -78,6 +76,20 @@ impl Lease {
         let lines: String = places.iter().map(|it| format!("{PLACE}{it}\n")).collect();
         file.write_all(lines.as_bytes())
     }
+}
+
+/// What the file of a lease says: whose it is, and where that can be asked.
+fn said_in(file: &mut File) -> (String, Vec<String>) {
+    let mut said = String::new();
+    // Who holds it is a courtesy; that it is held is the fact.
+    let _ = file.rewind().and_then(|()| file.read_to_string(&mut said));
+    let (owner, places) = said.split_once('\n').unwrap_or((&said, ""));
+    let places = places.lines().filter_map(|it| it.strip_prefix(PLACE));
+    let owner = match owner.trim() {
+        "" => "a program that has just begun",
+        owner => owner,
+    };
+    (owner.to_owned(), places.map(str::to_owned).collect())
 }
 
 /// In one piece over all that a killed program has left, and shortened only then: whoever looks meanwhile is told a
@@ -123,6 +135,7 @@ mod tests {
             other => panic!("{other}"),
         };
         assert!(of_second().1.is_empty(), "it does not listen yet");
+        assert_eq!(Lease::owner(&store), Some(of_second()));
         lease
             .announce(&["unix:/run/a b".into(), "tcp:[::1]:8470".into()])
             .unwrap();

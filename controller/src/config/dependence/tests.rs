@@ -186,6 +186,10 @@ fn a_calibration_made_without_a_correction_is_foreign_when_that_is_on_again() {
         assert!(off.is(usual.as_str()), "{key}");
         assert!(off.is(off.as_str()), "{key}");
     }
+    let off = VOLUMETRIC.edit("correct_air = true", "correct_air = false");
+    assert!(!hash(VOLUMETRIC).is(hash(&off).as_str()));
+    let cold = VOLUMETRIC.edit_first("correct_material = false", "correct_material = true");
+    assert_eq!(hash(VOLUMETRIC).as_str(), hash(&cold).as_str());
     // No beam leans by nothing.
     assert_eq!(LINEAR.matches("correct_cosine = false").count(), 1);
     let leans = LINEAR.edit_first("misalignment_mrad = 0.0", "misalignment_mrad = 2.0");

@@ -188,3 +188,16 @@ fn a_number_that_is_too_large_for_its_key_says_what_fits() {
     let says = ["1000000000000 is impossible", "give 0 to 4294967295"];
     check(LINEAR, from, "bitrate_bit_per_s = 1000000000000", key, says);
 }
+
+#[test]
+fn a_number_in_quotes_is_told_as_it_was_meant_or_not_at_all() {
+    let from = "vendor_id = 0x000007FF";
+    let key = "axis.x.identity.vendor_id";
+    let says = ["expected a whole number", "without quotes: 0x000007FF"];
+    check(LINEAR, from, "vendor_id = \"0x000007FF\"", key, says);
+    let (from, key) = ("speed_mm_per_s = 200.0", "axis.x.speed_mm_per_s");
+    let says = ["expected a number", "give a number"];
+    check(LINEAR, from, "speed_mm_per_s = \"12,5\"", key, says);
+    let says = ["expected a number", "without quotes and unit: 200"];
+    check(LINEAR, from, "speed_mm_per_s = \"200 mm/s\"", key, says);
+}

@@ -16,7 +16,7 @@ use units::{Metres, Radians};
 use super::bus::{SerialLine, Wiring};
 use crate::config::judge::Judge;
 pub(crate) use nd287::Nd287Config;
-pub(crate) use off::SwitchedOff;
+pub(crate) use off::{NOT_OF_LINES, SwitchedOff};
 pub(crate) use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.

@@ -11,6 +11,9 @@ const AIR_PPM: f64 = 271.4;
 /// By how much a degree changes that.
 const AIR_PPM_PER_KELVIN: f64 = 0.95;
 
+/// What reads lines of three axes reads the machine as warm as it is; thermometers do the rest.
+pub(crate) const NOT_OF_LINES: &str = "correct_material";
+
 /// A correction that is switched off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SwitchedOff {
@@ -42,8 +45,7 @@ impl SwitchedOff {
                 self.name,
                 self.told(length)
             ),
-            help: "switch it on; a calibration made without says so, counts it as uncertainty, and is foreign \
-                   afterwards"
+            help: "switch it on; a calibration made without says so, and is foreign afterwards"
                 .into(),
         }
     }
@@ -74,7 +76,10 @@ pub(super) fn switched_off(made: &Settings, every: &Settings) -> Vec<SwitchedOff
         key: "correct_air",
         effect: Effect::Length { ppm: AIR_PPM },
     });
-    let path = every.dead_path.filter(|_| made.dead_path.is_none());
+    // Without the air's index there is nothing to correct the dead path by: that is told of the air.
+    let path = every
+        .dead_path
+        .filter(|_| made.air && made.dead_path.is_none());
     let path = path.filter(|it| it.length != Metres::ZERO);
     let path = path.map(|it| SwitchedOff {
         name: "dead path",
@@ -123,17 +128,15 @@ mod tests {
     #[test]
     fn what_is_switched_off_is_told_with_what_it_comes_to() {
         assert_eq!(off(LINEAR), []);
+        let path = LINEAR.edit("correct_dead_path = true", "correct_dead_path = false");
+        let says = "they drift by 0.095 µm for each kelvin of the air";
+        assert_eq!(off(&path), [("correct_dead_path", says.to_owned())]);
         let text = LINEAR
             .edit("correct_air = true", "correct_air = false")
-            .edit("correct_dead_path = true", "correct_dead_path = false")
             .edit("correct_material = true", "correct_material = false")
             .edit("misalignment_mrad = 0.0", "misalignment_mrad = 2.0");
         let expected = [
             ("correct_air", "wrong by 16.284 µm over 60 mm"),
-            (
-                "correct_dead_path",
-                "they drift by 0.095 µm for each kelvin of the air",
-            ),
             (
                 "correct_material",
                 "wrong by 0.69 µm over 60 mm for each kelvin off 20 °C",

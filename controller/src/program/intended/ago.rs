@@ -8,7 +8,7 @@ const HOUR_S: i64 = 60 * MINUTE_S;
 const DAY_S: i64 = 24 * HOUR_S;
 
 /// `6 days ago`; `None` for what is no time, or has not been yet.
-pub(super) fn since(then: &str) -> Option<String> {
+pub(crate) fn since(then: &str) -> Option<String> {
     between(then.parse().ok()?, Timestamp::now())
 }
 

@@ -1,12 +1,13 @@
 //! What a verb is going to do.
 
-mod ago;
+pub(crate) mod ago;
 pub(crate) mod nowhere;
 
-use machine::records::{Store, short};
+use machine::records::{RecordHead, short};
 use serde_json::{Value, json};
 
 use crate::Failure;
+use crate::config::Loaded;
 use crate::program::{
     AskArgs, AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs, ZeroArgs,
 };
@@ -79,6 +80,11 @@ impl Step {
         }
     }
 
+    /// Whether something is driven.
+    pub(crate) fn moves(&self) -> bool {
+        matches!(self.what, "zero" | "move")
+    }
+
     /// For people.
     pub(crate) fn line(&self) -> String {
         format!("{}: {}: {}", self.whose, self.what, self.text)
@@ -90,27 +96,51 @@ impl Step {
     }
 }
 
-/// What corrects `whose` moves: what `store` says is in use under `pointer`.
+/// What corrects `whose` moves: what the store of `loaded` says is in use under `pointer`.
+///
+/// # Errors
+/// It belongs to another stage or configuration, or cannot be read; a calibration is made all the same.
 pub(crate) fn calibration(
-    store: &Store,
+    loaded: &Loaded,
     (whose, pointer): (&str, &str),
     intent: Intent<'_>,
 ) -> Result<Step, Failure> {
-    let current = store.active(pointer)?.current;
-    let by = match &current {
-        None => "no calibration".to_owned(),
-        Some(id) => {
-            let created = store.glance(id)?.head.created;
-            let ago = ago::since(&created).map_or(String::new(), |it| format!(", {it}"));
-            format!("calibration {} of {created}{ago}", short(id))
-        }
-    };
-    let text = match (intent, current) {
+    let text = match intent {
         _ if intent.is_uncompensated() => "NOT CORRECTED: --uncompensated".to_owned(),
-        (Intent::Calibrate(_), None) => "none is in use".into(),
-        (Intent::Calibrate(_), Some(_)) => format!("{by} stays in use until then"),
-        (_, None) => format!("NOT CORRECTED: {by} is in use"),
-        (_, Some(_)) => format!("corrected by {by}"),
+        Intent::Calibrate(args) => {
+            let until = if args.no_activate { "" } else { " until then" };
+            match in_use(loaded, pointer) {
+                Ok(None) => "none is in use".into(),
+                Ok(Some(used)) => format!("{used} stays in use{until}"),
+                Err(failure) => format!("the one in use cannot be used: {failure}"),
+            }
+        }
+        _ => match in_use(loaded, pointer)? {
+            None => "NOT CORRECTED: no calibration is in use".into(),
+            Some(used) => format!("corrected by {used}"),
+        },
     };
     Ok(Step::new("calibration", whose, text))
+}
+
+/// The calibration in use, for people. Who the drive is shows only when the machine is connected.
+fn in_use(loaded: &Loaded, pointer: &str) -> Result<Option<String>, Failure> {
+    let section = &loaded.config.machine;
+    let store = section.store();
+    let Some(id) = store.active(pointer)?.current else {
+        return Ok(None);
+    };
+    let head = store.glance(&id)?.head;
+    let here = RecordHead {
+        stage_serial: section.stage_serial.clone(),
+        config_hash: loaded.hash.as_str().to_owned(),
+        ..head.clone()
+    };
+    head.belongs_to(&id, &here, &loaded.hash)?;
+    let created = &head.created;
+    let ago = ago::since(created).map_or(String::new(), |it| format!(", {it}"));
+    Ok(Some(format!(
+        "calibration {} of {created}{ago}",
+        short(&id)
+    )))
 }

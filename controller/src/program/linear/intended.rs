@@ -6,10 +6,11 @@ use units::{Metres, Several, Short, ShortSpan};
 
 use crate::Failure;
 use crate::config::{AxisConfig, Loaded};
-use crate::linear::Corrected;
 use crate::linear::run_plan::{plan_of, speed_of};
 use crate::linear::settings::require_within;
 use crate::linear::stored::stored_course;
+use crate::linear::zero::require_alone;
+use crate::linear::{Corrected, ZeroConfig};
 use crate::program::AxisArgs;
 use crate::program::intended::{Intent, Step, calibration};
 use crate::program::linear::gantry;
@@ -17,6 +18,20 @@ use crate::program::linear::moved::warning_of;
 use crate::program::linear::verbs::require_active;
 use crate::program::session::choose_axis;
 use crate::program::targets::axis_targets;
+use crate::run::missing;
+
+/// Words that linear axes have no use for.
+pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
+    match intent {
+        Intent::Zero(_) => Ok(()),
+        Intent::Calibrate(args) => args.readings.refuse(),
+        Intent::Verify(args) => args.readings.refuse(),
+        Intent::Move(args) => {
+            args.without_way()?;
+            args.without_align()
+        }
+    }
+}
 
 pub(crate) fn intended(
     loaded: &Loaded,
@@ -31,9 +46,10 @@ pub(crate) fn intended(
             let mut steps = Vec::new();
             for (axis, target) in axis_targets(args)? {
                 require_within(&loaded.config, &axis, target)?;
+                require_alone(&loaded.config, &axis)?;
                 let of_axis = &loaded.config.axis[&axis];
-                steps.extend(zero_of(&axis, of_axis));
-                steps.push(calibration(store, (&axis, &axis), intent)?);
+                steps.push(zero_of(&axis, of_axis)?);
+                steps.push(calibration(loaded, (&axis, &axis), intent)?);
                 let corrected = match args.agreed.uncompensated {
                     true => Corrected::No,
                     false => stored_corrected(loaded, store, (&axis, target))?,
@@ -72,32 +88,44 @@ fn zeroed(loaded: &Loaded, args: &AxisArgs) -> Result<Vec<Step>, Failure> {
     let config = &loaded.config;
     let Some(gantry) = gantry::asked_for(config, args.axis.as_deref()) else {
         let axis = choose_axis(config.axis.keys().cloned().collect(), args)?;
-        return Ok(zero_of(&axis, &config.axis[&axis]).into_iter().collect());
+        require_alone(config, &axis)?;
+        return Ok(vec![zero_of(&axis, &config.axis[&axis])?]);
     };
-    let [first, second] = &config.gantry[&gantry].axes;
-    let together = format!("{first} and {second} together, then each by itself");
-    let sides = [first, second];
-    let each = sides
-        .into_iter()
-        .filter_map(|it| zero_of(it, &config.axis[it]));
-    Ok([Step::new("zero", &gantry, together)]
-        .into_iter()
-        .chain(each)
-        .collect())
+    let sides = &config.gantry[&gantry].axes;
+    let together = format!(
+        "{} and {} together to their negative limit switches and on to their nominal zeros",
+        sides[0], sides[1]
+    );
+    let mut steps = vec![Step::new("zero", &gantry, together)];
+    for side in sides {
+        let own = zero_config(side, &config.axis[side])?;
+        steps.push(Step::new("zero", side, search_of(own)));
+    }
+    Ok(steps)
 }
 
-/// The way to the zero; `None` for an axis that is not configured for one, which its verb refuses.
-fn zero_of(axis: &str, of_axis: &AxisConfig) -> Option<Step> {
-    let own = of_axis.zero.as_ref()?;
+fn zero_config<'a>(axis: &str, of_axis: &'a AxisConfig) -> Result<&'a ZeroConfig, Failure> {
+    of_axis.zero.as_ref().ok_or_else(|| missing(axis, "zero"))
+}
+
+/// The way to the zero.
+fn zero_of(axis: &str, of_axis: &AxisConfig) -> Result<Step, Failure> {
+    let own = zero_config(axis, of_axis)?;
     let text = format!(
-        "to its negative limit switch at {} mm/s, on to its nominal zero {} mm from there, then to and fro past \
-         two Hall sensors at {} mm/s, no farther than {} mm",
+        "to its negative limit switch at {} mm/s, on to its nominal zero {} mm from there, then {}",
         Short(own.reference_speed_mm_per_s),
         Short(-own.negative_limit_mm),
+        search_of(own)
+    );
+    Ok(Step::new("zero", axis, text))
+}
+
+fn search_of(own: &ZeroConfig) -> String {
+    format!(
+        "to and fro past two Hall sensors at {} mm/s, no farther than {} mm",
         Short(own.search_speed_mm_per_s),
         Short(own.search_limit_mm),
-    );
-    Some(Step::new("zero", axis, text))
+    )
 }
 
 fn measured(
@@ -110,9 +138,10 @@ fn measured(
     if stage == Stage::Verify && !intent.is_uncompensated() {
         require_active(store, &axis)?;
     }
+    require_alone(&loaded.config, &axis)?;
     let of_axis = &loaded.config.axis[&axis];
-    let mut steps: Vec<Step> = zero_of(&axis, of_axis).into_iter().collect();
-    steps.push(calibration(store, (&axis, &axis), intent)?);
+    let mut steps = vec![zero_of(&axis, of_axis)?];
+    steps.push(calibration(loaded, (&axis, &axis), intent)?);
     let (then, is_verified) = match intent {
         Intent::Calibrate(args) if args.no_activate => {
             ("; what was found is stored, and not used", false)
@@ -123,19 +152,24 @@ fn measured(
         ),
         Intent::Zero(_) | Intent::Verify(_) | Intent::Move(_) => ("", false),
     };
-    steps.extend(run_of(&axis, of_axis, stage, then));
+    steps.push(run_of(&axis, of_axis, stage, then)?);
     if is_verified {
-        steps.extend(run_of(&axis, of_axis, Stage::Verify, ""));
+        steps.push(run_of(&axis, of_axis, Stage::Verify, "")?);
     }
     Ok(steps)
 }
 
-/// The measuring run; `None` for an axis that is not configured for it, which its verb refuses.
-fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage, then: &str) -> Option<Step> {
-    let plan = plan_of(of_axis, stage)?;
+/// The measuring run.
+fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage, then: &str) -> Result<Step, Failure> {
+    let section = match stage {
+        Stage::Calibrate => "calibrate",
+        _ => "verify",
+    };
+    let plan = plan_of(of_axis, stage).ok_or_else(|| missing(axis, section))?;
     let speed = speed_of(of_axis);
     let planned = plan.planned(speed);
-    let (first, last) = (plan.targets.first()?, plan.targets.last()?);
+    let ends = [plan.targets.first(), plan.targets.last()];
+    let [first, last] = ends.map(|it| it.copied().unwrap_or_default());
     let mut text = format!(
         "{} from {} to {} mm, {} from each side, read by {}: {} m at {} mm/s, {} at least",
         Several(plan.targets.len() as u64, "position"),
@@ -147,16 +181,10 @@ fn run_of(axis: &str, of_axis: &AxisConfig, stage: Stage, then: &str) -> Option<
         Short(of_axis.motion.speed_mm_per_s),
         ShortSpan(planned.at_least),
     );
-    let what = match stage {
-        Stage::Calibrate => {
-            text += then;
-            "calibrate"
-        }
-        _ => {
-            let tolerance = of_axis.verify.as_ref().map(|it| it.accuracy_tolerance_um);
-            text += &tolerance.map_or(String::new(), |it| format!("; tolerance {} µm", Short(it)));
-            "verify"
-        }
+    let tolerance = of_axis.verify.as_ref().map(|it| it.accuracy_tolerance_um);
+    text += &match (stage, tolerance) {
+        (Stage::Verify, Some(it)) => format!("; tolerance {} µm", Short(it)),
+        _ => then.to_owned(),
     };
-    Some(Step::new(what, axis, text))
+    Ok(Step::new(section, axis, text))
 }

@@ -39,6 +39,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers: |_| Vec::new(),
     made_together: |_, _| None,
     demos: demo::DEMOS,
+    refuse: intended::refuse,
     intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,

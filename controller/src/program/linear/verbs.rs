@@ -91,31 +91,40 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    args.readings.refuse()?;
-    let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
+    // What is stored is told, whatever becomes of the verification.
+    let mut made = None;
+    let mut session = Session::open(&args.axis.machine, "calibrate", Use::Measurement, output)?;
+    let axis = choose_axis(session.machine.devices().axis_names(), &args.axis)?;
+    let store = session.store.clone();
+    let resume = journal_to_resume(args.resume.as_ref(), &store, "calibrate", &axis)?;
+    let ended = session.machine.guarded(|machine| {
+        machine.start()?;
+        machine.linear(&axis)?.zero(&store)?;
+        let resumed = resume.clone();
         let options = CalibrateOptions {
-            resume: prepared.resume,
+            resume,
             accept_drift: args.accept_drift,
             aside: args.no_activate,
         };
-        let calibrated = machine.linear(axis)?.calibrate(store, &options)?;
+        let calibrated = resumable(&store, "calibrate", &axis, resumed.as_deref(), || {
+            machine.linear(&axis)?.calibrate(&store, &options)
+        })?;
+        let calibrated = made.insert(calibrated);
         let verified = match args.verify {
-            true => Some(machine.linear(axis)?.verify(
-                store,
-                &VerifyOptions {
-                    compensated: true,
-                    calibration: Some(calibrated.id.clone()),
-                    resume: None,
-                },
-            )?),
+            true => Some(verified_by(machine, &axis, &store, &calibrated.id)?),
             false => None,
         };
-        Ok((axis.to_owned(), calibrated, verified))
+        machine.shut_down()?;
+        Ok((verified, to_json::counters(&machine.devices().counters())))
+    });
+    let Some(calibrated) = made else {
+        return ended.and(Ok(None));
     };
-    let resume = args.resume.as_ref();
-    let made = with_zeroed_axis(&args.axis, "calibrate", output, false, resume, run)?;
-    let ((axis, calibrated, verified), counters) = made;
     let mut told = told::calibrated(&calibrated);
+    let (verified, counters) = match ended {
+        Ok(ended) => ended,
+        Err(failure) => return output.bad_result(&told.text, told.value, failure),
+    };
     let Some(verified) = verified else {
         return output.told(told, counters);
     };
@@ -123,6 +132,23 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     told.text += &format!("\n{}", then.text);
     told.value["verified"] = then.value;
     judged(&axis, &verified, told, counters, output)
+}
+
+/// Verifies with the calibration that was just made.
+fn verified_by(
+    machine: &mut Machine,
+    axis: &str,
+    store: &Store,
+    calibration: &str,
+) -> Result<Verified, Failure> {
+    let options = VerifyOptions {
+        compensated: true,
+        calibration: Some(calibration.to_owned()),
+        resume: None,
+    };
+    resumable(store, "verify", axis, None, || {
+        machine.linear(axis)?.verify(store, &options)
+    })
 }
 
 /// What was verified as left, and whether it is within the tolerance.
@@ -139,7 +165,6 @@ fn judged(axis: &str, verified: &Verified, told: Told, counters: Value, output: 
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
-    args.readings.refuse()?;
     let compensated = !args.uncompensated;
     let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
         let verified = machine.linear(axis)?.verify(
@@ -168,8 +193,6 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    args.without_way()?;
-    args.without_align()?;
     let targets = axis_targets(args)?;
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let agreed = args.agreed.agreed();

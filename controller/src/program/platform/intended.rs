@@ -5,14 +5,70 @@ use units::{Several, Short};
 
 use crate::Failure;
 use crate::config::Loaded;
-use crate::platform::PlatformConfig;
-use crate::program::MoveArgs;
+use crate::platform::{PlatformConfig, PlatformFailure};
 use crate::program::intended::{Intent, Step, calibration, nowhere};
 use crate::program::platform::target::NamedPose;
-use crate::program::platform::verbs::refuse_impossible;
+use crate::program::platform::verbs::{refuse_impossible, refuse_uncalibrated};
+use crate::program::{AxisArgs, MoveArgs};
 
 /// What all screws are called together.
 const WHOLE: &str = "platform";
+
+/// Words that a platform has no use for.
+pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
+    match intent {
+        Intent::Zero(args) => whole_only(&args.axis),
+        Intent::Calibrate(args) => {
+            args.only_made()?;
+            args.readings.refuse()?;
+            whole_only(&args.axis)?;
+            never_resumed(args.resume.is_some())?;
+            never_drifted(args.accept_drift)
+        }
+        Intent::Verify(args) => {
+            args.readings.refuse()?;
+            whole_only(&args.axis)?;
+            never_resumed(args.resume.is_some())
+        }
+        Intent::Move(args) => {
+            args.without_way()?;
+            args.without_beyond()
+        }
+    }
+}
+
+/// A platform's screws are zeroed, calibrated and verified together.
+fn whole_only(args: &AxisArgs) -> Result<(), Failure> {
+    let Some(axis) = &args.axis else {
+        return Ok(());
+    };
+    Err(Failure::Usage {
+        what: format!("{axis} is part of a platform, whose screws only work together"),
+        help: "leave --axis out: the command is for all of them".into(),
+    })
+}
+
+fn never_resumed(resume: bool) -> Result<(), Failure> {
+    if !resume {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "a platform's run cannot be resumed".into(),
+        help: "it takes minutes: start it again".into(),
+    })
+}
+
+fn never_drifted(accept_drift: bool) -> Result<(), Failure> {
+    if !accept_drift {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "a platform that has drifted cannot be calibrated".into(),
+        help: "leave --accept-drift out; wait until the temperature has settled, or raise \
+               closure_limit_um"
+            .into(),
+    })
+}
 
 pub(crate) fn intended(
     loaded: &Loaded,
@@ -25,13 +81,19 @@ pub(crate) fn intended(
     let mut steps = vec![zeroed(platform)];
     if !matches!(intent, Intent::Zero(_)) {
         for screw in &platform.actuator {
-            steps.push(calibration(store, (&screw.axis, &screw.axis), intent)?);
+            steps.push(calibration(loaded, (&screw.axis, &screw.axis), intent)?);
         }
     }
     match intent {
         Intent::Zero(_) => {}
-        Intent::Calibrate(_) => steps.extend(calibrated(platform)),
-        Intent::Verify(_) => steps.extend(verified(platform)),
+        Intent::Calibrate(_) => steps.push(calibrated(platform)?),
+        Intent::Verify(args) => {
+            let step = verified(platform)?;
+            if !args.uncompensated {
+                refuse_uncalibrated(&mut nowhere::machine(loaded), store)?;
+            }
+            steps.push(step);
+        }
         Intent::Move(args) => steps.push(moved(loaded, store, platform, args)?),
     }
     Ok(steps)
@@ -49,9 +111,13 @@ fn zeroed(platform: &PlatformConfig) -> Step {
     Step::new("zero", WHOLE, text)
 }
 
-/// `None` for a platform that is not configured for it, which the verb refuses.
-fn calibrated(platform: &PlatformConfig) -> Option<Step> {
-    let own = platform.calibrate.as_ref()?;
+fn missing(section: &'static str) -> Failure {
+    PlatformFailure::NotConfigured { section }.into()
+}
+
+fn calibrated(platform: &PlatformConfig) -> Result<Step, Failure> {
+    let own = platform.calibrate.as_ref();
+    let own = own.ok_or_else(|| missing("calibrate"))?;
     let strokes = platform.actuator.iter().map(|screw| {
         let strokes = own.strokes_of(screw);
         let count = strokes.targets().len() as u64;
@@ -66,12 +132,12 @@ fn calibrated(platform: &PlatformConfig) -> Option<Step> {
         Several(own.runs, "time"),
         platform.camera,
     );
-    Some(Step::new("calibrate", WHOLE, text))
+    Ok(Step::new("calibrate", WHOLE, text))
 }
 
-/// Likewise.
-fn verified(platform: &PlatformConfig) -> Option<Step> {
-    let own = platform.verify.as_ref()?;
+fn verified(platform: &PlatformConfig) -> Result<Step, Failure> {
+    let own = platform.verify.as_ref();
+    let own = own.ok_or_else(|| missing("verify"))?;
     let text = format!(
         "{} within ±{} mm in x, ±{} mm in y and ±{}°, seen by {}; tolerance {} µm",
         Several(own.poses, "pose"),
@@ -81,7 +147,7 @@ fn verified(platform: &PlatformConfig) -> Option<Step> {
         platform.camera,
         Short(own.tolerance_um),
     );
-    Some(Step::new("verify", WHOLE, text))
+    Ok(Step::new("verify", WHOLE, text))
 }
 
 fn moved(

@@ -30,6 +30,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers: |_| Vec::new(),
     made_together: screws_of,
     demos: demo::DEMOS,
+    refuse: intended::refuse,
     intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,

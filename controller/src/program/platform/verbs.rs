@@ -48,29 +48,7 @@ fn zeroed_platform<P, R>(
     })
 }
 
-/// A platform's screws are zeroed, calibrated and verified together.
-fn whole_only(args: &AxisArgs) -> Result<(), Failure> {
-    let Some(axis) = &args.axis else {
-        return Ok(());
-    };
-    Err(Failure::Usage {
-        what: format!("{axis} is part of a platform, whose screws only work together"),
-        help: "leave --axis out: the command is for all of them".into(),
-    })
-}
-
-fn never_resumed(resume: bool) -> Result<(), Failure> {
-    if !resume {
-        return Ok(());
-    }
-    Err(Failure::Usage {
-        what: "a platform's run cannot be resumed".into(),
-        help: "it takes minutes: start it again".into(),
-    })
-}
-
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
-    whole_only(args)?;
     let mut session = Session::open(&args.machine, "zero", Use::Measurement, output)?;
     let store = session.store.clone();
     let zeroed = session.machine.guarded(|machine| {
@@ -89,18 +67,6 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    args.only_made()?;
-    args.readings.refuse()?;
-    whole_only(&args.axis)?;
-    never_resumed(args.resume.is_some())?;
-    if args.accept_drift {
-        return Err(Failure::Usage {
-            what: "a platform that has drifted cannot be calibrated".into(),
-            help: "leave --accept-drift out; wait until the temperature has settled, or raise \
-                   closure_limit_um"
-                .into(),
-        });
-    }
     let run = |machine: &mut Machine, store: &Store| machine.platform()?.calibrate(store);
     let (calibrated, counters) =
         with_zeroed_platform(&args.axis.machine, "calibrate", output, run)?;
@@ -110,9 +76,6 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
-    args.readings.refuse()?;
-    whole_only(&args.axis)?;
-    never_resumed(args.resume.is_some())?;
     let compensated = !args.uncompensated;
     let run = |machine: &mut Machine, store: &Store| {
         if compensated {
@@ -132,8 +95,6 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    args.without_way()?;
-    args.without_beyond()?;
     let named = NamedPose::parse(&args.targets)?;
     let mut session = Session::open(&args.machine, "move", Use::Measurement, output)?;
     let compensated = !args.agreed.uncompensated;
@@ -182,9 +143,14 @@ pub(super) fn refuse_impossible(
     if align {
         machine.platform()?.check_alignable()?;
     }
-    if !compensated {
-        return Ok(());
+    match compensated {
+        true => refuse_uncalibrated(machine, store),
+        false => Ok(()),
     }
+}
+
+/// Whether every screw has a calibration.
+pub(super) fn refuse_uncalibrated(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
     let without = machine.platform()?.without_calibration(store)?;
     match without.is_empty() {
         true => Ok(()),

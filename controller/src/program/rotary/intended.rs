@@ -6,37 +6,68 @@ use units::{Several, Short};
 use crate::Failure;
 use crate::config::Loaded;
 use crate::program::intended::{Intent, Step, calibration};
+use crate::program::rotary::readings::{ReadBy, axis_of};
 use crate::program::rotary::targets::{named_way, targets, to};
-use crate::program::session::choose_axis;
 use crate::program::{AxisArgs, MoveArgs};
 use crate::rotary::{DirectionName, RotaryConfig};
+use crate::run::missing;
+
+/// Words that rotary axes have no use for.
+pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
+    match intent {
+        Intent::Zero(_) | Intent::Verify(_) => Ok(()),
+        Intent::Calibrate(args) => args.only_made(),
+        Intent::Move(args) => {
+            args.without_beyond()?;
+            args.without_align()
+        }
+    }
+}
 
 pub(crate) fn intended(
     loaded: &Loaded,
     store: &Store,
     intent: Intent<'_>,
 ) -> Result<Vec<Step>, Failure> {
-    let of_one = |args: &AxisArgs, run: fn(&str, &RotaryConfig) -> Option<Step>| {
-        let axis = choose_axis(loaded.config.rotary.keys().cloned().collect(), args)?;
-        let of_axis = &loaded.config.rotary[&axis];
-        let mut steps: Vec<Step> = zero_of(&axis, of_axis).into_iter().collect();
-        if !matches!(intent, Intent::Zero(_)) {
-            steps.push(calibration(store, (&axis, &axis), intent)?);
-        }
-        steps.extend(run(&axis, of_axis));
-        Ok(steps)
-    };
     match intent {
-        Intent::Zero(args) => of_one(&args.axis, |_, _| None),
-        Intent::Calibrate(args) => of_one(&args.axis, calibrated),
-        Intent::Verify(args) => of_one(&args.axis, verified),
+        Intent::Zero(args) => {
+            let axis = axis_of(loaded, &args.axis)?;
+            Ok(vec![zero_of(&axis, &loaded.config.rotary[&axis])?])
+        }
+        Intent::Calibrate(args) => {
+            let read_by = ReadBy::of(&args.axis, &args.readings)?;
+            measured(loaded, intent, (&args.axis, read_by), calibrated)
+        }
+        Intent::Verify(args) => {
+            let read_by = ReadBy::of(&args.axis, &args.readings)?;
+            measured(loaded, intent, (&args.axis, read_by), verified)
+        }
         Intent::Move(args) => moved(loaded, store, intent, args),
     }
 }
 
-/// The way to the zero; `None` for an axis that is not configured for one, which its verb refuses.
-fn zero_of(axis: &str, of_axis: &RotaryConfig) -> Option<Step> {
-    let own = of_axis.zero.as_ref()?;
+/// A plate that a person reads by himself needs no machine: nothing is driven then.
+fn measured(
+    loaded: &Loaded,
+    intent: Intent<'_>,
+    (args, read_by): (&AxisArgs, ReadBy),
+    run: fn(&str, &RotaryConfig) -> Result<Step, Failure>,
+) -> Result<Vec<Step>, Failure> {
+    let axis = axis_of(loaded, args)?;
+    let of_axis = &loaded.config.rotary[&axis];
+    let zero = match read_by {
+        ReadBy::Alone => None,
+        ReadBy::Detector | ReadBy::Driven => Some(zero_of(&axis, of_axis)?),
+    };
+    let calibration = calibration(loaded, (&axis, &axis), intent)?;
+    let run = run(&axis, of_axis)?;
+    Ok(zero.into_iter().chain([calibration, run]).collect())
+}
+
+/// The way to the zero.
+fn zero_of(axis: &str, of_axis: &RotaryConfig) -> Result<Step, Failure> {
+    let own = of_axis.zero.as_ref();
+    let own = own.ok_or_else(|| missing(axis, "zero"))?;
     let direction = match own.index_direction {
         DirectionName::Forward => "forward",
         DirectionName::Reverse => "in reverse",
@@ -45,12 +76,16 @@ fn zero_of(axis: &str, of_axis: &RotaryConfig) -> Option<Step> {
         "{direction} to the encoder's index mark at {}°/s, up to one turn",
         Short(own.index_speed_deg_per_s)
     );
-    Some(Step::new("zero", axis, text))
+    Ok(Step::new("zero", axis, text))
 }
 
-fn calibrated(axis: &str, of_axis: &RotaryConfig) -> Option<Step> {
-    let own = of_axis.calibrate.as_ref()?;
-    let design = own.design().ok()?;
+fn calibrated(axis: &str, of_axis: &RotaryConfig) -> Result<Step, Failure> {
+    let own = of_axis.calibrate.as_ref();
+    let own = own.ok_or_else(|| missing(axis, "calibrate"))?;
+    // The file was judged: it can be planned.
+    let offsets = own
+        .design()
+        .map_or_else(|_| Vec::new(), |it| it.offsets().to_vec());
     let by = match of_axis.has_detector() {
         true => format!(
             "{} in each direction at {}°/s",
@@ -62,22 +97,22 @@ fn calibrated(axis: &str, of_axis: &RotaryConfig) -> Option<Step> {
     let text = format!(
         "plate {} of {} lines at the offsets {:?}, to which somebody turns it: {by}; what was found is stored and \
          used from then on",
-        own.plate,
-        own.lines,
-        design.offsets(),
+        own.plate, own.lines, offsets,
     );
-    Some(Step::new("calibrate", axis, text))
+    Ok(Step::new("calibrate", axis, text))
 }
 
-fn verified(axis: &str, of_axis: &RotaryConfig) -> Option<Step> {
-    let (own, plate) = (of_axis.verify.as_ref()?, of_axis.calibrate.as_ref()?);
+fn verified(axis: &str, of_axis: &RotaryConfig) -> Result<Step, Failure> {
+    let (own, plate) = (of_axis.verify.as_ref(), of_axis.calibrate.as_ref());
+    let own = own.ok_or_else(|| missing(axis, "verify"))?;
+    let plate = plate.ok_or_else(|| missing(axis, "calibrate"))?;
     let text = format!(
         "plate {} at the offset {}, to which somebody turns it; tolerance {}″",
         plate.plate,
         Short(own.offset_lines),
         Short(own.tolerance_arcsec),
     );
-    Some(Step::new("verify", axis, text))
+    Ok(Step::new("verify", axis, text))
 }
 
 fn moved(
@@ -96,11 +131,11 @@ fn moved(
                 known: known.join(", "),
             })
         })?;
-        steps.extend(zero_of(&axis, of_axis));
+        steps.push(zero_of(&axis, of_axis)?);
         if !args.agreed.uncompensated && store.active(&axis)?.current.is_none() {
             return Err(Failure::not_calibrated(&axis));
         }
-        steps.push(calibration(store, (&axis, &axis), intent)?);
+        steps.push(calibration(loaded, (&axis, &axis), intent)?);
         let text = format!(
             "{}, at {}°/s",
             to(angle, way),

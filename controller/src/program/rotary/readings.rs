@@ -99,7 +99,7 @@ impl ReadBy {
     }
 }
 
-fn axis_of(loaded: &Loaded, args: &AxisArgs) -> Result<String, Failure> {
+pub(super) fn axis_of(loaded: &Loaded, args: &AxisArgs) -> Result<String, Failure> {
     choose_axis(loaded.config.rotary.keys().cloned().collect(), args)
 }
 

@@ -62,8 +62,7 @@ pub(super) fn to(angle: Radians, way: Way) -> String {
 /// That an angle of several turns is another one; `None` where it is not, or turns are counted.
 pub(super) fn turns_left_out(angle: Radians, way: Way) -> Option<String> {
     let degrees = angle.degrees();
-    let turns = (degrees / 360.0).floor();
-    let is_within = turns == 0.0 || way == Way::Turns;
+    let is_within = (within_a_turn(angle) - degrees).abs() < 1e-6 || way == Way::Turns;
     (!is_within).then(|| {
         format!(
             "{}° is {}°; with --way turns whole turns are made",
@@ -74,7 +73,9 @@ pub(super) fn turns_left_out(angle: Radians, way: Way) -> Option<String> {
 }
 
 fn within_a_turn(angle: Radians) -> f64 {
-    angle.degrees().rem_euclid(360.0)
+    // What rounding leaves below zero is zero, and no whole turn.
+    let degrees = (angle.degrees() * 1e9).round() / 1e9;
+    degrees.rem_euclid(360.0)
 }
 
 #[cfg(test)]
@@ -84,6 +85,7 @@ mod tests {
     #[test]
     fn an_angle_of_several_turns_is_told_as_the_one_that_is_gone_to() {
         let told = |degrees, way| to(Radians::from_degrees(degrees), way);
+        assert_eq!(told(-1e-14, Way::Shortest), "to 0°, by the shortest way");
         assert_eq!(told(40.0, Way::Shortest), "to 40°, by the shortest way");
         assert_eq!(
             told(400.0, Way::Forward),

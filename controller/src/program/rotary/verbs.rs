@@ -56,7 +56,6 @@ enum Reader {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    args.only_made()?;
     let mut operator = match ReadBy::of(&args.axis, &args.readings)? {
         ReadBy::Detector => Reader::Detector(Terminal::new(
             args.ask.yes,
@@ -128,8 +127,6 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    args.without_beyond()?;
-    args.without_align()?;
     let (targets, way) = (targets(args)?, named_way(args));
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let store = session.store.clone();

@@ -1,18 +1,56 @@
 //! What a verb is going to do with three axes.
 
+use compensator::volumetric::identify::Purpose;
 use machine::records::Store;
 use units::{Metres, Several, Short};
 
 use crate::Failure;
 use crate::config::Loaded;
 use crate::program::intended::{Intent, Step, calibration, nowhere};
-use crate::program::volumetric::verbs::{never_measured, refuse_unreachable, targets};
-use crate::program::{CalibrateArgs, MoveArgs};
+use crate::program::volumetric::verbs::{never_measured, refuse_unreachable, targets, warm_up_of};
+use crate::program::{CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::calibrate::plan::volume_plan;
-use crate::volumetric::{GEOMETRY, VolumeAxisName, VolumetricConfig};
+use crate::volumetric::{GEOMETRY, VolumeAxisName, VolumetricConfig, VolumetricFailure};
 
 /// What all three axes are called together.
 const WHOLE: &str = "x, y, z";
+
+/// Words that three axes have no use for.
+pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
+    match intent {
+        Intent::Zero(_) => Ok(()),
+        Intent::Calibrate(args) => made_anew(args),
+        Intent::Verify(args) => read_anew(args),
+        Intent::Move(args) => {
+            args.without_way()?;
+            args.without_beyond()?;
+            args.without_align()
+        }
+    }
+}
+
+fn made_anew(args: &CalibrateArgs) -> Result<(), Failure> {
+    args.only_made()?;
+    args.readings.refuse()?;
+    if args.accept_drift {
+        return Err(Failure::Usage {
+            what: "a calibration of three axes is not judged by its closure".into(),
+            help: "start it again without --accept-drift".into(),
+        });
+    }
+    warm_up_of(args).map(drop)
+}
+
+fn read_anew(args: &VerifyArgs) -> Result<(), Failure> {
+    args.readings.refuse()?;
+    if args.resume.is_some() {
+        return Err(Failure::Usage {
+            what: "a verification of three axes cannot be resumed".into(),
+            help: "it is one line: start it again".into(),
+        });
+    }
+    Ok(())
+}
 
 pub(crate) fn intended(
     loaded: &Loaded,
@@ -24,12 +62,18 @@ pub(crate) fn intended(
     };
     let mut steps = vec![zeroed(volume)];
     if !matches!(intent, Intent::Zero(_)) {
-        steps.push(calibration(store, (WHOLE, GEOMETRY), intent)?);
+        steps.push(calibration(loaded, (WHOLE, GEOMETRY), intent)?);
     }
     match intent {
         Intent::Zero(_) => {}
-        Intent::Calibrate(args) => steps.extend(calibrated(volume, args)?),
-        Intent::Verify(_) => steps.extend(verified(volume)),
+        Intent::Calibrate(args) => steps.push(calibrated(volume, args)?),
+        Intent::Verify(args) => {
+            let step = verified(volume)?;
+            if !args.uncompensated && store.active(GEOMETRY)?.current.is_none() {
+                return Err(VolumetricFailure::NoGeometry.into());
+            }
+            steps.push(step);
+        }
         Intent::Move(args) => steps.push(moved(loaded, store, volume, args)?),
     }
     Ok(steps)
@@ -49,16 +93,17 @@ fn zeroed(volume: &VolumetricConfig) -> Step {
     Step::new("zero", WHOLE, text)
 }
 
-/// `None` for three axes that are not configured for it, which the verb refuses.
-fn calibrated(volume: &VolumetricConfig, args: &CalibrateArgs) -> Result<Option<Step>, Failure> {
-    let Some(own) = &volume.calibrate else {
-        return Ok(None);
-    };
-    let (plan, _) = volume_plan(volume, args.warm_up_min.is_some(), Vec::new())?;
+fn calibrated(volume: &VolumetricConfig, args: &CalibrateArgs) -> Result<Step, Failure> {
+    let (_, lines) = volume_plan(volume, args.warm_up_min.is_some(), Vec::new())?;
+    // Rolls are read by the machine's own detectors, where it has them.
+    let own = lines
+        .iter()
+        .filter(|it| matches!(it.purpose, Purpose::Roll(_)));
+    let instrument = volume.calibrate.as_ref().map(|it| it.instrument.as_str());
     let mut text = format!(
         "the references of the detectors, then {} that somebody sets {} up for, one after the other",
-        Several(plan.lines.len() as u64, "line"),
-        own.instrument,
+        Several((lines.len() - own.count()) as u64, "line"),
+        instrument.unwrap_or_default(),
     );
     if let Some(minutes) = args.warm_up_min {
         text += &format!(
@@ -67,12 +112,13 @@ fn calibrated(volume: &VolumetricConfig, args: &CalibrateArgs) -> Result<Option<
         );
     }
     text += "; what was found is stored and used from then on";
-    Ok(Some(Step::new("calibrate", WHOLE, text)))
+    Ok(Step::new("calibrate", WHOLE, text))
 }
 
-/// Likewise.
-fn verified(volume: &VolumetricConfig) -> Option<Step> {
-    let own = volume.verify.as_ref()?;
+fn verified(volume: &VolumetricConfig) -> Result<Step, Failure> {
+    let section = "verify";
+    let own = volume.verify.as_ref();
+    let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
     let place = |mm: [f64; 3]| mm.map(|it| Short(it).to_string()).join(", ");
     let text = format!(
         "{} on the line from ({}) to ({}) mm; tolerance {} µm",
@@ -81,7 +127,7 @@ fn verified(volume: &VolumetricConfig) -> Option<Step> {
         place(own.to_mm),
         Short(own.limit_um),
     );
-    Some(Step::new("verify", WHOLE, text))
+    Ok(Step::new("verify", WHOLE, text))
 }
 
 fn moved(

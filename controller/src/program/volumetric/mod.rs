@@ -32,6 +32,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     pointers,
     made_together: |_, _| None,
     demos: demo::DEMOS,
+    refuse: intended::refuse,
     intended: intended::intended,
     zero: verbs::zero,
     calibrate: verbs::calibrate,

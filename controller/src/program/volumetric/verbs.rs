@@ -76,27 +76,22 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     )
 }
 
-pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    args.only_made()?;
-    args.readings.refuse()?;
-    if args.accept_drift {
-        return Err(Failure::Usage {
-            what: "a calibration of three axes is not judged by its closure".into(),
-            help: "start it again without --accept-drift".into(),
-        });
-    }
-    let warm_up = match args.warm_up_min {
-        None => WarmUp::None,
+/// How the machine becomes warm.
+pub(super) fn warm_up_of(args: &CalibrateArgs) -> Result<WarmUp, Failure> {
+    match args.warm_up_min {
+        None => Ok(WarmUp::None),
         Some(minutes) if minutes.is_finite() && minutes > 0.0 && minutes < 1e5 => {
-            WarmUp::Travel(Duration::from_secs_f64(minutes * 60.0))
+            Ok(WarmUp::Travel(Duration::from_secs_f64(minutes * 60.0)))
         }
-        Some(minutes) => {
-            return Err(Failure::Usage {
-                what: format!("--warm-up-min is {minutes}"),
-                help: "give the minutes for which the axes move to and fro".into(),
-            });
-        }
-    };
+        Some(minutes) => Err(Failure::Usage {
+            what: format!("--warm-up-min is {minutes}"),
+            help: "give the minutes for which the axes move to and fro".into(),
+        }),
+    }
+}
+
+pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    let warm_up = warm_up_of(args)?;
     let mut operator = Terminal::new(args.ask.yes, args.axis.machine.hand(), output)?;
     let ready = |_: &mut Machine, store: &Store| {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
@@ -205,13 +200,6 @@ pub(crate) fn found_value(found: &Identified) -> Value {
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
-    args.readings.refuse()?;
-    if args.resume.is_some() {
-        return Err(Failure::Usage {
-            what: "a verification of three axes cannot be resumed".into(),
-            help: "it is one line: start it again".into(),
-        });
-    }
     let mut operator = Terminal::new(args.ask.yes, args.axis.machine.hand(), output)?;
     let by = match args.uncompensated {
         true => VerifyBy::AsFound,
@@ -326,9 +314,6 @@ pub(super) fn refuse_unreachable(
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    args.without_way()?;
-    args.without_beyond()?;
-    args.without_align()?;
     let named = targets(args)?;
     let ready = |machine: &mut Machine, store: &Store| {
         let index_mm = machine.volumetric()?.config().zero.index_mm;

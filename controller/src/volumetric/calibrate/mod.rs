@@ -332,7 +332,6 @@ impl WorkVolume<'_> {
     }
 }
 
-/// Has these lines read again when the run is continued.
 /// What measures lines reads the machine as warm as it is: nothing is missing where nothing is reckoned back to 20 °C.
 fn of_lines(instrument: InstrumentRecord) -> InstrumentRecord {
     let mut switched_off = instrument.switched_off;
@@ -343,6 +342,7 @@ fn of_lines(instrument: InstrumentRecord) -> InstrumentRecord {
     }
 }
 
+/// Has these lines read again when the run is continued.
 fn void_lines(lines: &[usize], journal: &mut Journal<VolumeLog>) -> Result<(), Failure> {
     for line in lines.iter().copied() {
         journal.write(&VolumeEntry::LineVoid(LineVoidEntry { line }))?;
