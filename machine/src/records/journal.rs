@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::difference::{Difference, first_difference};
 use super::hash::ConfigHash;
 use super::head::{IdentityRecord, InstrumentRecord};
+use super::line::{opened, sealed};
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
 };
@@ -267,9 +268,8 @@ impl<L: Log> Journal<L> {
 
     fn append(&mut self, line: &impl Serialize) -> Result<(), StoreError> {
         let json = serde_json::to_string(line).expect("plain data always serialises");
-        let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
         self.file
-            .write_all(line.as_bytes())
+            .write_all(sealed(&json).as_bytes())
             .map_err(io_error("append to it", &self.path))
     }
 
@@ -390,16 +390,11 @@ fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
     }
     let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
     let text = text.strip_suffix('\n').ok_or("the line has no end")?;
-    let (digits, json) = text.split_once(' ').ok_or("no checksum")?;
-    let expected = u32::from_str_radix(digits, 16).map_err(|error| error.to_string())?;
-    let seen = crc32fast::hash(json.as_bytes());
-    if seen != expected {
-        return Err(format!("checksum {seen:08x}, the line says {expected:08x}"));
-    }
-    let tag: Tag = serde_json::from_str(json).map_err(|error| error.to_string())?;
+    let json = opened(text)?;
+    let tag: Tag = serde_json::from_str(&json).map_err(|error| error.to_string())?;
     let parsed = match MARKS.contains(&tag.entry.as_str()) {
-        true => serde_json::from_str(json).map(Line::Mark),
-        false => serde_json::from_str(json).map(Line::Entry),
+        true => serde_json::from_str(&json).map(Line::Mark),
+        false => serde_json::from_str(&json).map(Line::Entry),
     };
     parsed.map_err(|error| error.to_string())
 }

@@ -35,6 +35,7 @@ mod head;
 mod interrupted;
 mod journal;
 mod lease;
+mod line;
 mod name;
 pub mod sound;
 mod store;
@@ -50,6 +51,7 @@ pub use journal::{
     AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_journal,
 };
 pub use lease::Lease;
+pub use line::{opened, sealed};
 pub use name::short;
 pub use store::{ActivePointer, Store};
 

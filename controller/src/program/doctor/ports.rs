@@ -125,10 +125,18 @@ fn line_checks(host: &Host, name: &str, path: &Path) -> Vec<Checked> {
             let fix = "sudo usermod -aG dialout $USER, then log in again; or install packaging/70-truestage.rules";
             return vec![Checked::bad(name, told, fix)];
         }
-        Some(kind) => {
-            let told = format!("{shown}: {kind}");
+        Some(ErrorKind::NotFound) => {
+            let told = format!("{shown} is not there");
             let fix = "plug it in; `ls -l /dev/serial/by-id` lists adapters by names that stay";
             return vec![Checked::bad(name, told, fix)];
+        }
+        Some(kind) => {
+            let told = format!("{shown}: {kind}");
+            return vec![Checked::bad(
+                name,
+                told,
+                "see what the kernel says: `dmesg | tail`",
+            )];
         }
     }
     let mut found = vec![Checked::good(name, format!("{shown} can be opened"))];
@@ -227,7 +235,7 @@ mod tests {
             ["16 ms", "tee /sys/bus"],
         );
         let found = line_checks(&host, "laser", &path.with_file_name("ttyUSB8"));
-        expect(&found, "laser", Verdict::Bad, ["not found", "by-id"]);
+        expect(&found, "laser", Verdict::Bad, ["is not there", "by-id"]);
     }
 
     #[test]

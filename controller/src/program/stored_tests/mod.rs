@@ -22,7 +22,7 @@ use crate::program::output::Output;
 use crate::program::{cal, report};
 use crate::store::golden::Golden;
 use crate::{Failure, platform, rotary};
-use machine::records::Store;
+use machine::records::{Store, opened, sealed};
 
 /// So many of each kind in every run.
 pub(super) const QUICK: usize = 400;
@@ -58,14 +58,19 @@ impl Desk {
     }
 
     fn put_journal(&self, name: &str, lines: &[Value]) -> PathBuf {
-        let text = lines.iter().map(|it| {
-            let json = it.to_string();
-            format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()))
+        let text = lines.iter().map(|it| match it.is_object() {
+            true => sealed(&it.to_string()),
+            false => in_front(&it.to_string()),
         });
         let path = self.store.runs().join(name);
         fs::write(&path, text.collect::<String>()).expect("there is room");
         path
     }
+}
+
+/// As earlier programs wrote a line, whatever its value is.
+fn in_front(json: &str) -> String {
+    format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()))
 }
 
 /// Of three axes every other node and reading; of others all.
@@ -91,8 +96,8 @@ fn thinned(mut lines: Vec<Value>) -> Vec<Value> {
 
 pub(crate) fn lines_of(journal: &str) -> Vec<Value> {
     let json = |line: &str| {
-        let (_, json) = line.split_once(' ').expect("a checksum");
-        serde_json::from_str(json).expect("it is JSON")
+        let json = opened(line).expect("its checksum is right");
+        serde_json::from_str(&json).expect("it is JSON")
     };
     journal.lines().map(json).collect()
 }

@@ -301,6 +301,8 @@ mod tests {
 
     use super::*;
     use crate::Edit;
+    use machine::records::sealed;
+
     use crate::program::stored_tests::lines_of;
     use machine::records::Store;
 
@@ -346,10 +348,7 @@ mod tests {
             let own = |it: &&mut Value| it["entry"] == "line_reading" && it["line"] == DIAGONAL;
             let diagonal = lines.iter_mut().filter(own).enumerate();
             diagonal.for_each(|(at, line)| change(at, line));
-            let text = lines.iter().map(|it| {
-                let json = it.to_string();
-                format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()))
-            });
+            let text = lines.iter().map(|it| sealed(&it.to_string()));
             let runs = self.store.runs();
             fs::create_dir_all(&runs).unwrap();
             fs::write(runs.join(name), text.collect::<String>()).unwrap();
