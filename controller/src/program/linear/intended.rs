@@ -14,7 +14,6 @@ use crate::linear::{Corrected, ZeroConfig};
 use crate::program::AxisArgs;
 use crate::program::intended::{Intent, Step, calibration};
 use crate::program::linear::gantry;
-use crate::program::linear::moved::warning_of;
 use crate::program::linear::verbs::require_active;
 use crate::program::session::choose_axis;
 use crate::program::targets::axis_targets;
@@ -73,15 +72,28 @@ fn stored_corrected(
 }
 
 fn moved(axis: &str, of_axis: &AxisConfig, (target, corrected): (Metres, Corrected)) -> Step {
-    let mut text = format!(
-        "to {} mm, at {} mm/s",
+    let text = format!(
+        "to {} mm, at {} mm/s{}",
         Short(target.mm()),
-        Short(of_axis.motion.speed_mm_per_s)
+        Short(of_axis.motion.speed_mm_per_s),
+        warning(corrected)
     );
-    if let Some(warning) = warning_of(corrected, target) {
-        text += &format!("; {warning}");
-    }
     Step::new("move", axis, text)
+}
+
+fn warning(corrected: Corrected) -> String {
+    match corrected {
+        Corrected::Within => String::new(),
+        Corrected::No => {
+            "; NOT CORRECTED: by its encoder alone, and off by the deviation of the stage there"
+                .into()
+        }
+        Corrected::Held { first, last } | Corrected::Fading { first, last, .. } => format!(
+            "; BEYOND THE CALIBRATED RANGE of {} to {} mm, where the deviation of the stage was never measured",
+            Short(first.mm()),
+            Short(last.mm())
+        ),
+    }
 }
 
 fn zeroed(loaded: &Loaded, args: &AxisArgs) -> Result<Vec<Step>, Failure> {
