@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use machine::records::{Glance, Lease, RecordHead, Store, short};
+use machine::records::{Glance, Lease, Store, short};
 use serde_json::{Value, json};
 
 use crate::config::Loaded;
+use crate::program::belongs::head_of;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
@@ -172,18 +173,11 @@ pub(crate) fn compared(
 /// The stage and the configuration are checked here; the drive itself when it is used.
 fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
-    let section = &loaded.config.machine;
     let store = loaded.config.machine.store();
     // Whoever measures with a calibration must find it there to the end.
     let _lease = Lease::take(&store, "cal activate")?;
     let id = store.resolve(id)?;
-    let head = store.glance(&id)?.head;
-    let here = RecordHead {
-        stage_serial: section.stage_serial.clone(),
-        config_hash: loaded.hash.as_str().to_owned(),
-        ..head.clone()
-    };
-    head.belongs_to(&id, &here, &loaded.hash)?;
+    let head = head_of(&loaded, &store, &id)?;
     known_axis(&loaded, &head.axis)?;
     store.activate(&head.axis, &id)?;
     let text = format!("axis {}: {} is in use", head.axis, short(&id));

@@ -3,6 +3,7 @@
 mod align;
 mod ask;
 mod before;
+mod belongs;
 mod cal;
 mod check;
 mod data;

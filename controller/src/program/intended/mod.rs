@@ -3,11 +3,12 @@
 pub(crate) mod ago;
 pub(crate) mod nowhere;
 
-use machine::records::{RecordHead, short};
+use machine::records::short;
 use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::Loaded;
+use crate::program::belongs::head_of;
 use crate::program::{
     AskArgs, AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs, ZeroArgs,
 };
@@ -123,22 +124,14 @@ pub(crate) fn calibration(
     Ok(Step::new("calibration", whose, text))
 }
 
-/// The calibration in use, for people. Who the drive is shows only when the machine is connected.
+/// The calibration in use, for people.
 fn in_use(loaded: &Loaded, pointer: &str) -> Result<Option<String>, Failure> {
-    let section = &loaded.config.machine;
-    let store = section.store();
+    let store = loaded.config.machine.store();
     let Some(id) = store.active(pointer)?.current else {
         return Ok(None);
     };
-    let head = store.glance(&id)?.head;
-    let here = RecordHead {
-        stage_serial: section.stage_serial.clone(),
-        config_hash: loaded.hash.as_str().to_owned(),
-        ..head.clone()
-    };
-    head.belongs_to(&id, &here, &loaded.hash)?;
-    let created = &head.created;
-    let ago = ago::since(created).map_or(String::new(), |it| format!(", {it}"));
+    let created = head_of(loaded, &store, &id)?.created;
+    let ago = ago::since(&created).map_or(String::new(), |it| format!(", {it}"));
     Ok(Some(format!(
         "calibration {} of {created}{ago}",
         short(&id)
