@@ -149,13 +149,17 @@ fn changed(line: &str, slip: Slip, chance: &mut Chance) -> Option<(String, Strin
     }
 }
 
+/// What is told of a file; or why nothing is.
+fn refused(it: &Mistyped) -> Result<Vec<Diagnostic>, String> {
+    match parse(&it.text, "m.toml") {
+        Err(ConfigError::Invalid { findings }) => Ok(findings),
+        Err(other) => Err(format!("{other}")),
+        Ok(_) => Err("it is sound".into()),
+    }
+}
+
 /// What is wrong with how a file was refused.
-fn complaint(it: &Mistyped) -> Option<String> {
-    let found = match parse(&it.text, "m.toml") {
-        Err(ConfigError::Invalid { findings }) => findings,
-        Err(other) => return Some(format!("{other}")),
-        Ok(_) => return Some("it is sound".into()),
-    };
+fn complaint(it: &Mistyped, found: &[Diagnostic]) -> Option<String> {
     let is_whole =
         |one: &Diagnostic| !(one.key.is_empty() || one.cause.is_empty() || one.help.is_empty());
     let told = |one: &Diagnostic| one.line == it.line && is_whole(one);
@@ -171,12 +175,9 @@ fn complaint(it: &Mistyped) -> Option<String> {
 }
 
 /// Whether a mistyped word is told with the one that was meant.
-fn is_meant(it: &Mistyped) -> bool {
-    let Err(ConfigError::Invalid { findings }) = parse(&it.text, "m.toml") else {
-        return false;
-    };
+fn is_meant(it: &Mistyped, found: &[Diagnostic]) -> bool {
     let wanted = format!("did you mean `{}`?", it.meant);
-    findings.iter().any(|one| one.help.starts_with(&wanted))
+    found.iter().any(|one| one.help.starts_with(&wanted))
 }
 
 #[test]
@@ -190,10 +191,16 @@ fn what_somebody_mistyped_is_refused_with_its_place_and_what_was_meant() {
     for it in drawn {
         *tally.entry(it.slip).or_default() += 1;
         let shown = it.text.lines().nth(it.line - 1).unwrap_or_default();
-        wrong.extend(complaint(&it).map(|told| format!("{:?}, `{shown}`: {told}", it.slip)));
+        let refused = refused(&it);
+        let found = refused.as_deref().unwrap_or_default();
+        let told = match &refused {
+            Ok(found) => complaint(&it, found),
+            Err(told) => Some(told.clone()),
+        };
+        wrong.extend(told.map(|told| format!("{:?}, `{shown}`: {told}", it.slip)));
         if matches!(it.slip, Slip::Key | Slip::Section) {
             words += 1;
-            let is_right = is_meant(&it);
+            let is_right = is_meant(&it, found);
             right += usize::from(is_right);
             if !is_right {
                 println!("not told what was meant: `{shown}` for `{}`", it.meant);

@@ -4,7 +4,6 @@ use units::Metres;
 
 use crate::config::MachineConfig;
 use crate::config::judge::Finding;
-use crate::hardware::instrument::NOT_OF_LINES;
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(volume) = &config.volumetric else {
@@ -17,8 +16,9 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let longest = lengths.map(|(high, low)| high - low).fold(0.0, f64::max);
     let length = Metres::from_mm(longest);
     let instrument = config.instrument.get(&own.instrument);
-    let off = instrument.into_iter().flat_map(|it| it.switched_off());
-    let off = off.filter(|it| it.key != NOT_OF_LINES);
+    let off = instrument
+        .into_iter()
+        .flat_map(|it| it.switched_off_of_lines());
     found.extend(off.map(|it| it.warned(&own.instrument, "x, y and z", length)));
 }
 

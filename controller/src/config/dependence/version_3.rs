@@ -7,7 +7,6 @@
 use super::text::{Place, quoted};
 use super::version_2;
 use crate::config::model::MachineConfig;
-use crate::hardware::instrument::NOT_OF_LINES;
 
 /// `None` where nothing is switched off.
 pub(super) fn text(config: &MachineConfig) -> Option<String> {
@@ -48,7 +47,8 @@ fn of_lines(config: &MachineConfig) -> Vec<String> {
         .as_ref()
         .and_then(|it| it.calibrate.as_ref());
     let instrument = own.and_then(|it| config.instrument.get(&it.instrument));
-    let off = instrument.into_iter().flat_map(|it| it.switched_off());
-    let off = off.filter(|it| it.key != NOT_OF_LINES);
+    let off = instrument
+        .into_iter()
+        .flat_map(|it| it.switched_off_of_lines());
     off.map(|it| it.name.to_owned()).collect()
 }

@@ -16,7 +16,7 @@ use units::{Metres, Radians};
 use super::bus::{SerialLine, Wiring};
 use crate::config::judge::Judge;
 pub(crate) use nd287::Nd287Config;
-pub(crate) use off::{NOT_OF_LINES, SwitchedOff};
+pub(crate) use off::SwitchedOff;
 pub(crate) use umd2::Umd2Config;
 
 /// Standard uncertainty of an angle that somebody set with a beam finder and a card.
@@ -182,6 +182,14 @@ impl InstrumentConfig {
     /// Which corrections are switched off that would change its readings.
     pub(crate) fn switched_off(&self) -> Vec<SwitchedOff> {
         off::switched_off(&self.corrections(), &self.every_correction())
+    }
+
+    /// The same of an instrument that reads lines of three axes: they are measured as warm as they are, and thermometers
+    /// do the rest.
+    pub(crate) fn switched_off_of_lines(&self) -> Vec<SwitchedOff> {
+        let mut off = self.switched_off();
+        off.retain(|it| it.key != off::MATERIAL);
+        off
     }
 
     fn cosine(&self) -> Cosine {

@@ -11,8 +11,8 @@ const AIR_PPM: f64 = 271.4;
 /// By how much a degree changes that.
 const AIR_PPM_PER_KELVIN: f64 = 0.95;
 
-/// What reads lines of three axes reads the machine as warm as it is; thermometers do the rest.
-pub(crate) const NOT_OF_LINES: &str = "correct_material";
+/// The key of the correction for the expansion of what is measured.
+pub(super) const MATERIAL: &str = "correct_material";
 
 /// A correction that is switched off.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,7 +92,7 @@ pub(super) fn switched_off(made: &Settings, every: &Settings) -> Vec<SwitchedOff
     let material = material.filter(|_| made.material_expansion.is_none());
     let material = material.map(|it| SwitchedOff {
         name: "material",
-        key: "correct_material",
+        key: MATERIAL,
         effect: Effect::PerKelvin {
             ppm: it.per_kelvin * 1e6,
         },

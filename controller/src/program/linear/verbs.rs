@@ -19,48 +19,33 @@ use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::run::CalibrateOptions;
 use crate::{Agreed, Failure, Machine};
 
-/// What is settled before anything moves.
-struct Prepared {
-    calibration: Option<String>,
+/// An axis of a machine that is connected, before anything moves.
+struct Opened {
+    session: Session,
+    axis: String,
+    store: Store,
+    /// The journal that is continued.
     resume: Option<PathBuf>,
 }
 
-/// Starts the machine, zeroes `axis`, loads its calibration, runs `procedure`, switches off.
-/// What the devices counted on the way comes with the result.
-fn with_zeroed_axis<R>(
-    args: &AxisArgs,
-    verb: &str,
-    output: Output,
-    load_calibration: bool,
-    resume: Option<&PathBuf>,
-    procedure: impl FnOnce(&mut Machine, &str, &Store, Prepared) -> Result<R, Failure>,
-) -> Result<(R, Value), Failure> {
-    let mut session = Session::open(&args.machine, verb, Use::Measurement, output)?;
-    let axis = choose_axis(session.machine.devices().axis_names(), args)?;
-    let store = session.store.clone();
-    let resume = journal_to_resume(resume, &store, verb, &axis)?;
-    if load_calibration {
-        require_active(&store, &axis)?;
-    }
-    session.machine.guarded(|machine| {
-        machine.start()?;
-        let calibration = if load_calibration {
-            machine.linear(&axis)?.load_active(&store)?
-        } else {
-            None
-        };
-        machine.linear(&axis)?.zero(&store)?;
-        let prepared = Prepared {
-            calibration,
+impl Opened {
+    fn new(
+        args: &AxisArgs,
+        verb: &str,
+        resume: Option<&PathBuf>,
+        output: Output,
+    ) -> Result<Self, Failure> {
+        let session = Session::open(&args.machine, verb, Use::Measurement, output)?;
+        let axis = choose_axis(session.machine.devices().axis_names(), args)?;
+        let store = session.store.clone();
+        let resume = journal_to_resume(resume, &store, verb, &axis)?;
+        Ok(Self {
+            session,
+            axis,
+            store,
             resume,
-        };
-        let resumed = prepared.resume.clone();
-        let result = resumable(&store, verb, &axis, resumed.as_deref(), || {
-            procedure(machine, &axis, &store, prepared)
-        })?;
-        machine.shut_down()?;
-        Ok((result, to_json::counters(&machine.devices().counters())))
-    })
+        })
+    }
 }
 
 /// A verification as left wants a calibration.
@@ -93,10 +78,12 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     // What is stored is told, whatever becomes of the verification.
     let mut made = None;
-    let mut session = Session::open(&args.axis.machine, "calibrate", Use::Measurement, output)?;
-    let axis = choose_axis(session.machine.devices().axis_names(), &args.axis)?;
-    let store = session.store.clone();
-    let resume = journal_to_resume(args.resume.as_ref(), &store, "calibrate", &axis)?;
+    let Opened {
+        mut session,
+        axis,
+        store,
+        resume,
+    } = Opened::new(&args.axis, "calibrate", args.resume.as_ref(), output)?;
     let ended = session.machine.guarded(|machine| {
         machine.start()?;
         machine.linear(&axis)?.zero(&store)?;
@@ -111,7 +98,14 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         })?;
         let calibrated = made.insert(calibrated);
         let verified = match args.verify {
-            true => Some(verified_by(machine, &axis, &store, &calibrated.id)?),
+            true => {
+                let options = VerifyOptions {
+                    compensated: true,
+                    calibration: Some(calibrated.id.clone()),
+                    resume: None,
+                };
+                Some(verified_by(machine, &axis, &store, &options)?)
+            }
             false => None,
         };
         machine.shut_down()?;
@@ -134,20 +128,14 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     judged(&axis, &verified, told, counters, output)
 }
 
-/// Verifies with the calibration that was just made.
 fn verified_by(
     machine: &mut Machine,
     axis: &str,
     store: &Store,
-    calibration: &str,
+    options: &VerifyOptions,
 ) -> Result<Verified, Failure> {
-    let options = VerifyOptions {
-        compensated: true,
-        calibration: Some(calibration.to_owned()),
-        resume: None,
-    };
-    resumable(store, "verify", axis, None, || {
-        machine.linear(axis)?.verify(store, &options)
+    resumable(store, "verify", axis, options.resume.as_deref(), || {
+        machine.linear(axis)?.verify(store, options)
     })
 }
 
@@ -166,25 +154,31 @@ fn judged(axis: &str, verified: &Verified, told: Told, counters: Value, output: 
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let compensated = !args.uncompensated;
-    let run = |machine: &mut Machine, axis: &str, store: &Store, prepared: Prepared| {
-        let verified = machine.linear(axis)?.verify(
-            store,
-            &VerifyOptions {
-                compensated,
-                calibration: prepared.calibration,
-                resume: prepared.resume,
-            },
-        )?;
-        Ok((axis.to_owned(), verified))
-    };
-    let ((axis, verified), counters) = with_zeroed_axis(
-        &args.axis,
-        "verify",
-        output,
-        compensated,
-        args.resume.as_ref(),
-        run,
-    )?;
+    let Opened {
+        mut session,
+        axis,
+        store,
+        resume,
+    } = Opened::new(&args.axis, "verify", args.resume.as_ref(), output)?;
+    if compensated {
+        require_active(&store, &axis)?;
+    }
+    let (verified, counters) = session.machine.guarded(|machine| {
+        machine.start()?;
+        let calibration = match compensated {
+            true => machine.linear(&axis)?.load_active(&store)?,
+            false => None,
+        };
+        machine.linear(&axis)?.zero(&store)?;
+        let options = VerifyOptions {
+            compensated,
+            calibration,
+            resume,
+        };
+        let verified = verified_by(machine, &axis, &store, &options)?;
+        machine.shut_down()?;
+        Ok((verified, to_json::counters(&machine.devices().counters())))
+    })?;
     let told = told::verified(&axis, &verified, compensated);
     match compensated {
         true => judged(&axis, &verified, told, counters, output),

@@ -174,7 +174,7 @@ impl WorkVolume<'_> {
             // It is brought along: who it is shows when it is switched on.
             instrument: InstrumentRecord {
                 identity: String::new(),
-                ..of_lines(self.core.instrument_record(instrument))
+                ..self.lines_instrument(instrument)
             },
             started: utc_now(),
             calibration,
@@ -182,6 +182,15 @@ impl WorkVolume<'_> {
             runs: 1,
             approach_m: None,
         })
+    }
+
+    /// What the records say of the instrument that reads lines.
+    fn lines_instrument(&self, name: &str) -> InstrumentRecord {
+        let off = self.core.config.instrument[name].switched_off_of_lines();
+        InstrumentRecord {
+            switched_off: off.iter().map(|it| it.name.to_owned()).collect(),
+            ..self.core.instrument_record(name)
+        }
     }
 
     fn read_lines(
@@ -311,7 +320,7 @@ impl WorkVolume<'_> {
         let head = RecordHead {
             created: utc_now(),
             source: source.clone(),
-            instrument: of_lines(self.core.instrument_record(&session.own.instrument)),
+            instrument: self.lines_instrument(&session.own.instrument),
             ..self.this_volume(GEOMETRY)?
         };
         let content = evaluated.content(&session.config);
@@ -329,16 +338,6 @@ impl WorkVolume<'_> {
             unknown,
             journal: journal.path().to_owned(),
         })
-    }
-}
-
-/// What measures lines reads the machine as warm as it is: nothing is missing where nothing is reckoned back to 20 °C.
-fn of_lines(instrument: InstrumentRecord) -> InstrumentRecord {
-    let mut switched_off = instrument.switched_off;
-    switched_off.retain(|it| it != "material");
-    InstrumentRecord {
-        switched_off,
-        ..instrument
     }
 }
 
