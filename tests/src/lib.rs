@@ -5,6 +5,7 @@
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
 pub mod apart;
+mod coverage;
 pub mod cycles;
 mod desk;
 mod emulator;
@@ -13,6 +14,7 @@ mod group;
 mod hand;
 mod interface;
 mod line_signal;
+mod many;
 mod not_run;
 mod pose_judge;
 mod random;
@@ -24,6 +26,7 @@ mod stand;
 pub mod stream;
 pub mod volume;
 
+pub use coverage::Coverage;
 pub use desk::{Desk, cia402_settings};
 pub use emulator::{Emulator, INTERFACE, Setup};
 pub use four_screws::{four_cyclic_axes, with_fourth_drive, with_fourth_screw};
@@ -31,6 +34,7 @@ pub use group::{Group, Start};
 pub use hand::Hand;
 pub use interface::{Interface, run};
 pub use line_signal::{with_emulated_line_signal, with_few_lines};
+pub use many::{judged_of_each, of_each};
 pub use not_run::{left_out, not_run};
 pub use pose_judge::{EDGE, PoseJudge, true_pose};
 pub use random::{normal, random, seeds};

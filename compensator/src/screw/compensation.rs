@@ -9,7 +9,7 @@
 
 use core::f64::consts::TAU;
 
-use units::portable::hypot;
+use crate::uncertainty::combine;
 use units::{Approach, Metres};
 
 use super::ScrewModel;
@@ -63,8 +63,9 @@ pub struct Correction {
     /// Where the nut will be at the lowest and at the highest; different while the engagement is
     /// not known.
     pub actual: (Metres, Metres),
-    /// Standard uncertainty of the nut's place from the model and from an unknown engagement (its
-    /// half range over √3); without the scatter of single moves.
+    /// Standard uncertainty of the nut's place after this one move: of the model, of what the screw does besides it (its
+    /// own errors at a stroke, and what a single move does not repeat: [`ScrewModel::scatter`]), and of an unknown
+    /// engagement (its half range over √3).
     pub standard_uncertainty: Option<Metres>,
 }
 
@@ -209,7 +210,8 @@ impl ScrewCompensation {
         let (low, high) = self.nut(&after);
         let standard_uncertainty = self.u_model(set_point, engagement).map(|u| {
             let doubt = (high - low) / 2.0 / 3.0_f64.sqrt();
-            Metres(hypot(u.value(), doubt))
+            let besides = self.model.scatter.unwrap_or_default();
+            Metres(combine(&[u.value(), besides.value(), doubt]))
         });
         Correction {
             set_point,

@@ -238,15 +238,22 @@ impl<Q: Quantity> Function<Q> {
     pub fn standard_uncertainty(&self, position: Metres) -> Option<Q> {
         let pieces = self.uncertainty.as_ref()?;
         let at_nodes = pieces.at(position.value());
+        let between = self.between_at(position).value();
+        Some(Q::from_value(
+            (at_nodes * at_nodes + between * between).sqrt(),
+        ))
+    }
+
+    /// How far the true function may be from this one there, by what it does between its nodes alone: a standard
+    /// uncertainty; zero where [`with_between`](Self::with_between) said nothing.
+    pub fn between_at(&self, position: Metres) -> Q {
         let (inside, at) = self.pieces.finder.find(position.value());
         let between = self.between.get(at).map_or(0.0, |middle| {
             let piece = &self.pieces.segments[at];
             let t = ((inside - piece.start) / piece.width).clamp(0.0, 1.0);
             middle * 4.0 * t * (1.0 - t)
         });
-        Some(Q::from_value(
-            (at_nodes * at_nodes + between * between).sqrt(),
-        ))
+        Q::from_value(between)
     }
 
     /// Where its nodes are.

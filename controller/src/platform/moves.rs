@@ -28,10 +28,18 @@ pub struct PoseMoved {
     pub set_points: Vec<(String, Metres)>,
     /// From the start of the first screw to that of the last, where more than one moved.
     pub skew: Option<Duration>,
-    /// The largest standard uncertainty of the screws' places, where calibrated.
-    pub standard_uncertainty: Option<Metres>,
+    /// The standard uncertainty of each screw's place, in the same order; `None` where it is not calibrated.
+    pub uncertainties: Vec<Option<Metres>>,
     /// The screws whose play was taken up before, because their engagement was unknown.
     pub taken_up: Vec<TakenUp>,
+}
+
+impl PoseMoved {
+    /// The largest standard uncertainty of the screws' places, where calibrated.
+    pub fn standard_uncertainty(&self) -> Option<Metres> {
+        let known = self.uncertainties.iter().flatten().copied();
+        known.reduce(Metres::max)
+    }
 }
 
 /// What one screw is to do.
@@ -128,10 +136,7 @@ impl AlignmentPlatform<'_> {
             target,
             set_points: names.zip(planned.iter().map(|it| it.set_point)).collect(),
             skew,
-            standard_uncertainty: planned
-                .iter()
-                .filter_map(|it| it.standard_uncertainty)
-                .reduce(Metres::max),
+            uncertainties: planned.iter().map(|it| it.standard_uncertainty).collect(),
             taken_up: Vec::new(),
         })
     }

@@ -21,7 +21,7 @@ use core::any::Any;
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
 use compensator::volumetric::model::{
-    AxisErrors, Machine as Model, Squareness, ThermalBend, VolumetricModel,
+    AxisErrors, ErrorCovariance, Machine as Model, Squareness, ThermalBend, VolumetricModel,
 };
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
@@ -54,6 +54,8 @@ pub struct VolumetricState {
     pub axes: [AxisErrors; 3],
     /// The squarenesses.
     pub squareness: Squareness,
+    /// How sure both are together, where that is known.
+    pub covariance: Option<ErrorCovariance>,
     /// Guides that bend, of those in the configuration.
     pub bends: Vec<IdentifiedBend>,
     /// Expansions of scales, in place of those in the configuration.
@@ -122,6 +124,7 @@ impl VolumetricCorrection {
             return Err(VolumetricFailure::Temperatures { seen, expected });
         }
         let model = limits::within(model(own, &state)?, config, own, &state.temperatures)?;
+        let model = model.with_covariance(state.covariance);
         let mut beams = [None, None, None];
         for (axis, beam) in Axis::ALL.into_iter().zip(own.beam.each()) {
             if let Some(beam) = beam {
@@ -183,6 +186,7 @@ impl VolumetricCorrection {
         let state = VolumetricState {
             axes: state.axes,
             squareness: state.squareness,
+            covariance: state.covariance,
             ..VolumetricState::default()
         };
         Self::new(&blind, state)

@@ -91,8 +91,8 @@ pub(crate) use memory_import::import;
 pub(crate) use record::GivenName;
 pub(crate) use record::{AXES, error_name};
 pub(crate) use record::{
-    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, DriftRecord, ExpansionRecord,
-    FunctionRecord, FunctionShape, UnknownRecord,
+    AgreementRecord, BeamRecord, BeamReferencesContent, BendRecord, CovarianceRecord, DriftRecord,
+    ExpansionRecord, FunctionRecord, FunctionShape, UnknownRecord,
 };
 pub(crate) use reference::References;
 pub(crate) use state::{GEOMETRY, REFERENCES, VolumetricRecords, memory_pointer};

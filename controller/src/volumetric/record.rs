@@ -3,6 +3,7 @@
 //! are to be kept (`state_memory`).
 
 mod agreement;
+mod covariance;
 mod given;
 mod memory;
 mod rolls;
@@ -13,7 +14,7 @@ use core::fmt;
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
-use compensator::volumetric::model::{AxisErrors, ErrorName, Squareness};
+use compensator::volumetric::model::{AxisErrors, ErrorCovariance, ErrorName, Squareness};
 use compensator::volumetric::online::{BeamDrift, BeamReference};
 use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
@@ -21,6 +22,7 @@ use units::{Celsius, Metres, Quantity, Radians};
 use crate::store::{IdentityRecord, StoreError, short};
 
 pub(crate) use agreement::AgreementRecord;
+pub(crate) use covariance::CovarianceRecord;
 pub(crate) use given::GivenName;
 pub use memory::{MemoryName, StateMemoryContent};
 pub(crate) use rolls::RollRecord;
@@ -155,6 +157,10 @@ pub struct GeometryContent {
     /// How well the readings agree with all this; `None` in files of earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agreement: Option<AgreementRecord>,
+    /// How sure functions and squarenesses are together; `None` in files of earlier programs, and where the errors were
+    /// not found from readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<CovarianceRecord>,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -196,7 +202,21 @@ impl GeometryContent {
             drives: Vec::new(),
             unknown: UnknownRecord::default(),
             agreement: None,
+            covariance: None,
         }
+    }
+
+    /// How sure functions and squarenesses are together, in the calibration `id`.
+    ///
+    /// # Errors
+    /// When the numbers are none.
+    pub(crate) fn covariance(&self, id: &str) -> Result<Option<ErrorCovariance>, StoreError> {
+        let known = self.covariance.as_ref().map(CovarianceRecord::covariance);
+        known.transpose().map_err(|source| StoreError::Part {
+            id: short(id),
+            name: "covariance".into(),
+            source: source.into(),
+        })
     }
 
     /// The error functions, in the calibration `id`.

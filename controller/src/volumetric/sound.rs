@@ -90,6 +90,7 @@ fn geometry(it: &GeometryContent) -> Judged {
     numbers("temperatures_c", &it.temperatures_c, &CELSIUS)?;
     counted("temperatures_c", it.temperatures_c.len(), 0..=COUNT_MAX)?;
     warmth(it)?;
+    it.covariance.as_ref().map_or(Ok(()), |it| it.judge())?;
     let drives = it.drives.len();
     let expected = || "none, or those of x, y and z".to_owned();
     is("drives", drives == 0 || drives == 3, expected, || {

@@ -101,6 +101,7 @@ impl WorkVolume<'_> {
         let mut state = VolumetricState {
             axes: geometry.errors(&id)?,
             squareness: geometry.squareness(),
+            covariance: geometry.covariance(&id)?,
             bends: geometry.bends(&id)?,
             expansions: geometry.expansions(&id)?,
             temperatures: geometry.temperatures(),

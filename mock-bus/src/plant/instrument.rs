@@ -6,10 +6,15 @@
 //! Meteorol. 20 (1981) 1527, 1996 revision). The compensator uses another equation on
 //! purpose; the two agree to about 1e-8 in ordinary air.
 //!
-//! Absent: air turbulence, polarisation mixing, thermal growth of the optics.
+//! Polarisations that mix make an error that repeats with each half wavelength (N. Bobroff, Meas. Sci. Technol. 4 (1993)
+//! 907): the first harmonic of it.
+//!
+//! Absent: air turbulence, further harmonics of that error, thermal growth of the optics.
+
+use core::f64::consts::TAU;
 
 use crate::random::Stream;
-use units::portable::{cos, exp};
+use units::portable::{cos, exp, sin};
 use units::{Celsius, Metres, Pascals, RelativeHumidity};
 
 use super::config::InterferometerConfig;
@@ -100,11 +105,23 @@ impl Interferometer {
         let n = refractive_index(air.air_temperature, air.pressure, air.humidity);
         let per_m = 2.0 * n / VACUUM_WAVELENGTH_M;
         let noise_m = (self.config.noise_nm * 1e-9 + self.vibration_m) * self.noise.gaussian();
+        let mixed_m = self.mixed_m(path_m * per_m);
         Fringes {
-            half_wavelengths: (path_m + noise_m) * per_m + self.slipped as f64,
+            half_wavelengths: (path_m + noise_m + mixed_m) * per_m + self.slipped as f64,
             half_wavelengths_per_s: speed * per_m,
             beam: if is_lit { self.beam } else { Beam::Blocked },
             too_fast: speed.abs() > self.config.speed_max_m_per_s,
+        }
+    }
+
+    /// What polarisations that mix add to a path of so many half wavelengths.
+    fn mixed_m(&self, half_wavelengths: f64) -> f64 {
+        let amplitude_m = self.config.nonlinearity_nm * 1e-9;
+        // A sine for each sample is worth sparing.
+        if amplitude_m > 0.0 {
+            amplitude_m * sin(TAU * half_wavelengths)
+        } else {
+            0.0
         }
     }
 

@@ -75,14 +75,14 @@ pub(super) fn is_enabled(emulated: &Emulated) -> bool {
 }
 
 /// The table's true error at a reading, arcsec.
-fn true_error(bench: &Bench, reading: Radians) -> f64 {
+pub(super) fn true_error(bench: &Bench, reading: Radians) -> f64 {
     let simulation = bench.emulated.simulation();
     let truth = simulation.truth();
     let table = truth.table().expect("it is one");
     table.encoder_error(reading).arcsec()
 }
 
-fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(super) fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let values: Vec<f64> = values.collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter().map(|it| it - mean).collect()

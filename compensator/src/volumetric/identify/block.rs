@@ -32,6 +32,17 @@ impl Block {
 }
 
 impl Block {
+    /// Of which axis's position it is.
+    pub(super) fn axis(&self) -> Axis {
+        axis_of(self.name)
+    }
+
+    /// Whether `position` is within its nodes.
+    pub(super) fn reaches(&self, position: f64) -> bool {
+        let (first, last) = (self.nodes[0], self.nodes[self.nodes.len() - 1]);
+        position >= first && position <= last
+    }
+
     /// How much each node's value counts at `position`.
     pub(super) fn weights(&self, position: f64) -> Vec<f64> {
         self.influences.iter().map(|it| it.at(position)).collect()

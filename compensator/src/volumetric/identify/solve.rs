@@ -10,7 +10,9 @@ use super::thermal::{IdentifiedBend, IdentifiedExpansion};
 use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessName};
 use crate::least_squares::{self, Fit};
 use crate::volumetric::function::{Function, FunctionError, Shape};
-use crate::volumetric::model::{AxisErrors, ErrorName, Squareness};
+use crate::volumetric::model::{
+    AxisErrors, COVARIANCE_ENTRIES, ErrorCovariance, ErrorName, Squareness,
+};
 
 /// One function found: values and uncertainties in SI units, metres or radians by its name.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,11 +98,7 @@ impl Identified {
         tool: Point,
         temperatures: &[Celsius],
     ) -> Option<Point> {
-        let inside = |block: &Block| {
-            let (ErrorName::Along(axis, _) | ErrorName::About(axis, _)) = block.name;
-            let position = at.along(axis).value();
-            position >= block.nodes[0] && position <= block.nodes[block.nodes.len() - 1]
-        };
+        let inside = |block: &Block| block.reaches(at.along(block.axis()).value());
         if !self.blocks.iter().all(inside) {
             return None;
         }
@@ -117,6 +115,58 @@ impl Identified {
             Metres((variance.max(0.0) + square).sqrt())
         });
         Some(Point::new(u[0], u[1], u[2]))
+    }
+
+    /// What functions and squarenesses have in common, at places on a grid whose `positions` along x, y and z are given;
+    /// what the functions do between their nodes is not in it. `None` when a place is outside the nodes.
+    pub fn covariance(&self, positions: [Vec<Metres>; 3]) -> Option<ErrorCovariance> {
+        let [of_x, of_y, of_z] = &positions;
+        let mut places = Vec::new();
+        for &x in of_x {
+            for &y in of_y {
+                places.extend(
+                    of_z.iter()
+                        .map(|&z| self.covariance_at(Point::new(x, y, z))),
+                );
+            }
+        }
+        let is_inside = |axis: Axis, it: &Metres| {
+            let own = self.blocks.iter().filter(|block| block.axis() == axis);
+            own.into_iter().all(|block| block.reaches(it.value()))
+        };
+        let mut each = Axis::ALL.into_iter().zip(&positions);
+        let inside = each.all(|(axis, own)| own.iter().all(|it| is_inside(axis, it)));
+        inside.then_some(())?;
+        ErrorCovariance::new(positions, places).ok()
+    }
+
+    fn covariance_at(&self, at: Point) -> [f64; COVARIANCE_ENTRIES] {
+        // The thermometers' references: what warmth does is uncertain by itself.
+        let above = vec![0.0; self.plan.thermal.references.len()];
+        let seen = |component: usize| {
+            error_row(
+                &self.plan,
+                &self.blocks,
+                at,
+                Point::ZERO,
+                &above,
+                |effect| {
+                    let own = [effect.moved, effect.turn].concat();
+                    own[component]
+                },
+            )
+        };
+        let rows: Vec<Vec<f64>> = (0..6).map(seen).collect();
+        let columns = rows[0].len();
+        let mut entries = [0.0; COVARIANCE_ENTRIES];
+        let pairs = (0..6).flat_map(|i| (i..6).map(move |k| (i, k)));
+        for (entry, (i, k)) in entries.iter_mut().zip(pairs) {
+            let pulled = self.covariance.chunks_exact(columns);
+            let pulled =
+                pulled.map(|row| row.iter().zip(&rows[k]).map(|(a, b)| a * b).sum::<f64>());
+            *entry = rows[i].iter().zip(pulled).map(|(a, b)| a * b).sum();
+        }
+        entries
     }
 }
 

@@ -38,6 +38,7 @@
 mod bound;
 mod chain;
 mod check;
+mod covariance;
 mod errors;
 mod extreme;
 mod pack;
@@ -48,6 +49,7 @@ mod uncertainty;
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 pub use chain::{Chain, ChainError};
+pub use covariance::{CovarianceError, ENTRIES as COVARIANCE_ENTRIES, ErrorCovariance};
 pub use errors::{AxisErrors, ErrorName, Squareness};
 pub use extreme::Extreme;
 pub use refusal::{ConditionsError, ModelError};
@@ -156,6 +158,8 @@ pub struct VolumetricModel {
     /// Commands that targets within the volume can have.
     commands: Volume,
     bounds: Bounds,
+    /// How sure functions and squarenesses are together; without it each is taken to be independent of the others.
+    covariance: Option<ErrorCovariance>,
 }
 
 impl VolumetricModel {
@@ -202,7 +206,14 @@ impl VolumetricModel {
             stages,
             commands,
             bounds,
+            covariance: None,
         })
+    }
+
+    /// The same, with how sure its functions and squarenesses are together.
+    #[must_use]
+    pub fn with_covariance(self, covariance: Option<ErrorCovariance>) -> Self {
+        Self { covariance, ..self }
     }
 
     /// Checks what holds at this moment: tool offset, temperatures in the order of the channels,

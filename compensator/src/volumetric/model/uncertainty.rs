@@ -10,8 +10,9 @@ use crate::volumetric::{Axis, NoCorrection, Point};
 
 impl VolumetricModel {
     /// The standard uncertainty of the deviation at a command: of the functions, squarenesses,
-    /// temperatures and thermal coefficients as far as they have one, taken as independent of
-    /// each other; with that of the detectors' displacements and rolls.
+    /// temperatures and thermal coefficients as far as they have one, with that of the detectors'
+    /// displacements and rolls. Functions and squarenesses have in common what
+    /// [`Self::with_covariance`] says of them; all else is taken as independent.
     ///
     /// `u_temperatures`, in kelvin by channel, are what the temperatures are known to now; a channel
     /// beyond their end is as sure as it says of itself. A gradient is never less sure than that it
@@ -28,7 +29,9 @@ impl VolumetricModel {
         u_temperatures: &[f64],
     ) -> Result<Point, NoCorrection> {
         self.commands.check(command)?;
-        let mut squares = [0.0; 3];
+        let known = self.covariance.as_ref();
+        let tool = core::array::from_fn(|k| now.tool[k]);
+        let mut squares = known.map_or([0.0; 3], |it| it.variances(command, tool));
         let mut combine = |effect: V3, u: f64| {
             for k in 0..3 {
                 squares[k] += effect[k] * effect[k] * u * u;
@@ -47,14 +50,15 @@ impl VolumetricModel {
                 } else {
                     u_roll.value()
                 };
-                let along = u_of(errors.along[k].as_ref(), position);
-                let about = u_of(errors.about[k].as_ref(), position);
+                let along = u_of(errors.along[k].as_ref(), position, known.is_some());
+                let about = u_of(errors.about[k].as_ref(), position, known.is_some());
                 combine(unit, along);
                 combine(cross(unit, lever), about);
                 combine(if sideways { unit } else { cross(unit, lever) }, u_live);
             }
         }
-        for (k, u) in self.machine.squareness.u.iter().enumerate() {
+        let own = self.machine.squareness.u.iter().enumerate();
+        for (k, u) in own.filter(|_| known.is_none()) {
             let mut one = [0.0; 3];
             one[k] = 1.0;
             combine(lean_effect(Squareness::lean(one), command), u.value());
@@ -127,7 +131,11 @@ fn lean_effect(lean: [V3; 3], command: Point) -> V3 {
     core::array::from_fn(|k| lean[0][k] * q[0] + lean[1][k] * q[1] + lean[2][k] * q[2])
 }
 
-fn u_of<Q: Quantity>(function: Option<&Function<Q>>, position: Metres) -> f64 {
-    let u = function.and_then(|it| it.standard_uncertainty(position));
+/// Of what the function does between its nodes alone, where it is known what the nodes have in common.
+fn u_of<Q: Quantity>(function: Option<&Function<Q>>, position: Metres, between_alone: bool) -> f64 {
+    let u = function.and_then(|it| match between_alone {
+        true => Some(it.between_at(position)),
+        false => it.standard_uncertainty(position),
+    });
     u.map_or(0.0, Q::value)
 }

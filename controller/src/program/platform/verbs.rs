@@ -221,7 +221,7 @@ fn moved_text(moved: &PoseMoved) -> String {
         });
         text += &format!("\nplay of {} taken up first{doubt}", it.axis);
     }
-    if let Some(u) = moved.standard_uncertainty {
+    if let Some(u) = moved.standard_uncertainty() {
         text += &format!(
             "\nstandard uncertainty of the screws' places {:.3} µm",
             u.um()
@@ -247,7 +247,7 @@ fn moved_value(moved: &PoseMoved) -> Value {
     json!({
         "screws": set_points,
         "skew_ms": moved.skew.map(|it| it.as_secs_f64() * 1e3),
-        "standard_uncertainty_um": moved.standard_uncertainty.map(to_json::um),
+        "standard_uncertainty_um": moved.standard_uncertainty().map(to_json::um),
         "taken_up": taken_up,
     })
 }

@@ -6,7 +6,7 @@ use compensator::volumetric::identify::{
     Alignment, BendPlan, ExpansionPlan, FunctionPlan, Identified, IdentifyError, Observation, Plan,
     RunSetup, Scattered, Snooped, SquarenessName, ThermalPlan,
 };
-use compensator::volumetric::model::{AxisErrors, ErrorName};
+use compensator::volumetric::model::{AxisErrors, ErrorCovariance, ErrorName};
 use units::{Celsius, Metres};
 
 use crate::config::MachineConfig;
@@ -17,8 +17,8 @@ use crate::volumetric::calibrate::cause::LikelyCauses;
 use crate::volumetric::calibrate::plan::axis_of;
 use crate::volumetric::settings::{beam_drift, bend_plans};
 use crate::volumetric::{
-    AgreementRecord, BeamReferencesContent, BendRecord, ExpansionRecord, GeometryContent,
-    LineEntry, UnknownRecord, VolumeLog, VolumePlanEntry, error_name, point,
+    AgreementRecord, BeamReferencesContent, BendRecord, CovarianceRecord, ExpansionRecord,
+    GeometryContent, LineEntry, UnknownRecord, VolumeLog, VolumePlanEntry, error_name, point,
 };
 use crate::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
 
@@ -103,9 +103,20 @@ impl VolumetricEvaluated {
             expansions: found.expansions.iter().map(ExpansionRecord::of).collect(),
             drives: self.drives.clone(),
             agreement: Some(self.agreement()),
+            covariance: self.covariance(config).as_ref().map(CovarianceRecord::of),
             unknown: UnknownRecord::of(&unknown, &self.without_effect),
             ..GeometryContent::new(of.0, of.1, of.2)
         }
+    }
+
+    /// How sure all errors are together, all over the volume.
+    fn covariance(&self, config: &VolumetricConfig) -> Option<ErrorCovariance> {
+        let even = |k: usize| {
+            let (low, high) = (config.low_mm[k], config.high_mm[k]);
+            let at = |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
+            (0..=PLACES).map(|n| Metres::from_mm(at(n))).collect()
+        };
+        self.found.covariance([even(0), even(1), even(2)])
     }
 
     /// Proves that the readings agree, and that the machine of `config` can be corrected by what was

@@ -244,6 +244,8 @@ pub struct InterferometerConfig {
     /// Angle between beam and travel.
     pub misalignment_mrad: f64,
     pub noise_nm: f64,
+    /// Amplitude of the error that repeats with each half wavelength of path: of polarisations that mix.
+    pub nonlinearity_nm: f64,
     /// Faster than this the counter loses count.
     pub speed_max_m_per_s: f64,
     /// Constant errors of the instrument's own sensors.
@@ -259,6 +261,7 @@ impl Default for InterferometerConfig {
             dead_path_mm: 50.0,
             misalignment_mrad: 0.2,
             noise_nm: 3.0,
+            nonlinearity_nm: 0.0,
             speed_max_m_per_s: 0.4,
             air_temperature_error_k: 0.0,
             pressure_error_hpa: 0.0,
