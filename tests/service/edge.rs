@@ -168,6 +168,29 @@ fn a_stream_of_events_goes_on_where_it_was_broken_off() {
     });
 }
 
+/// That a service ends is the last that whoever follows it hears: not that the connection was lost.
+#[test]
+fn a_stream_says_that_the_service_ends_before_it_is_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = Stage::new(tests::rigs()[0], (LINEAR, 51), folder.path(), |text| text);
+    let http = Http::of(&stage);
+    let stream = http.send("GET /v1/events?after=0 HTTP/1.1", b"");
+    let mut lines = BufReader::new(stream).lines();
+    // It is open: what happened before is on its way.
+    let first = lines.find(|it| it.as_ref().is_ok_and(|it| it.starts_with("data: ")));
+    assert!(first.is_some());
+    stage.end();
+    drop(http);
+    let rest: Vec<String> = lines.map(|it| it.expect("it ends in order")).collect();
+    let is_last_word = |it: &String| it.starts_with("data: ") && it.contains(r#""state":"ending""#);
+    assert!(rest.iter().any(is_last_word), "{rest:?}");
+    assert_eq!(
+        rest.last().map(String::as_str),
+        Some(""),
+        "its last chunk is there"
+    );
+}
+
 /// Whoever hears nothing for ten seconds takes the service for lost.
 #[test]
 fn a_stream_in_which_nothing_happens_says_that_it_is_alive() {

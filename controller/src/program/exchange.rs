@@ -54,37 +54,51 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
 /// An answer without an end, from its first line on. A service that lives says so every three seconds; one that says
 /// nothing for [`PATIENCE`] is lost.
 pub(crate) fn follow(at: &str, path: &str) -> Result<impl BufRead + use<>, Failure> {
-    let mut stream = connect(at).map_err(|error| gone(at, path, &error))?;
+    let gone = |error: io::Error| gone(at, path, &error);
+    let stream = connect(at).map_err(gone)?;
     let host = host_of(at);
     // HTTP/1.0: the answer comes as it is, not in chunks.
     let request =
         format!("GET {path} HTTP/1.0\r\nhost: {host}\r\naccept: text/event-stream\r\n\r\n");
-    let said = |error: io::Error| gone(at, path, &error);
-    stream.write_all(request.as_bytes()).map_err(said)?;
-    let mut stream = BufReader::new(stream);
-    let head = head_of(&mut stream).map_err(said)?;
-    let status = status_of(&head);
-    if status == "200" {
-        return Ok(stream);
+    let answer = Answer::to(stream, &request).map_err(gone)?;
+    if answer.is_good() {
+        return Ok(answer.body);
     }
-    let mut body = String::new();
-    stream
-        .take(ANSWER_MAX)
-        .read_to_string(&mut body)
-        .map_err(said)?;
-    let answer: Value = serde_json::from_str(&body).unwrap_or_default();
-    Err(refusal(at, status, &answer))
+    let (status, body) = answer.whole().map_err(gone)?;
+    Err(refusal(at, &status, &body))
 }
 
-/// To the empty line, or as far as it goes.
-fn head_of(stream: &mut impl BufRead) -> io::Result<String> {
-    let mut head = String::new();
-    while stream.read_line(&mut head)? > 0 && !head.ends_with("\r\n\r\n") {}
-    Ok(head)
+/// An answer whose head has come.
+struct Answer {
+    status: String,
+    body: BufReader<Box<dyn Stream>>,
 }
 
-fn status_of(head: &str) -> &str {
-    head.split(' ').nth(1).unwrap_or_default()
+impl Answer {
+    fn to(mut stream: Box<dyn Stream>, request: &str) -> io::Result<Self> {
+        stream.write_all(request.as_bytes())?;
+        let mut body = BufReader::new(stream);
+        let mut head = String::new();
+        // To the empty line, or as far as it goes.
+        while body.read_line(&mut head)? > 0 && !head.ends_with("\r\n\r\n") {}
+        if head.is_empty() {
+            let what = "it hung up without an answer";
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
+        }
+        let status = head.split(' ').nth(1).unwrap_or_default().to_owned();
+        Ok(Self { status, body })
+    }
+
+    fn is_good(&self) -> bool {
+        self.status.starts_with('2')
+    }
+
+    /// Its status, and all of its body.
+    fn whole(self) -> io::Result<(String, String)> {
+        let mut body = String::new();
+        self.body.take(ANSWER_MAX).read_to_string(&mut body)?;
+        Ok((self.status, body))
+    }
 }
 
 fn host_of(at: &str) -> &str {
@@ -119,35 +133,21 @@ fn exchange(
     let request = format!(
         "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
     );
-    let said = said_to(stream, &request).map_err(|error| gone(at, path, &error))?;
-    understood(at, &said)
-}
-
-fn said_to(mut stream: Box<dyn Stream>, request: &str) -> io::Result<String> {
-    stream.write_all(request.as_bytes())?;
-    let mut said = String::new();
-    stream.take(ANSWER_MAX).read_to_string(&mut said)?;
-    if said.is_empty() {
-        let what = "it hung up without an answer";
-        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
+    let answer = Answer::to(stream, &request).map_err(|error| gone(at, path, &error))?;
+    let is_good = answer.is_good();
+    let whole = answer.whole();
+    let (status, body) = whole.map_err(|error| gone(at, path, &error))?;
+    match is_good {
+        true => Ok(serde_json::from_str(&body).unwrap_or_default()),
+        false => Err(refusal(at, &status, &body)),
     }
-    Ok(said)
-}
-
-fn understood(at: &str, said: &str) -> Result<Value, Failure> {
-    let (head, body) = said.split_once("\r\n\r\n").unwrap_or((said, ""));
-    let status = status_of(head);
-    let answer: Value = serde_json::from_str(body).unwrap_or_default();
-    if status.starts_with('2') {
-        return Ok(answer);
-    }
-    Err(refusal(at, status, &answer))
 }
 
 /// The problem that the service answered with, in its words.
-fn refusal(at: &str, status: &str, answer: &Value) -> Failure {
+fn refusal(at: &str, status: &str, body: &str) -> Failure {
+    let answer: Value = serde_json::from_str(body).unwrap_or_default();
     let of = |name: &str| plain(answer[name].as_str().unwrap_or_default());
-    match exit_code_of(answer) {
+    match exit_code_of(&answer) {
         Some(exit_code) => Failure::Kept {
             said: of("detail"),
             exit_code,
@@ -199,10 +199,10 @@ mod tests {
     #[test]
     fn a_refusal_is_told_in_the_words_of_the_service_and_ends_as_there() {
         let answer = json!({"detail": "axis x has no zero; find it\u{1b}[2J", "exit_code": 3});
-        let failure = refusal("unix:s", "409", &answer);
+        let failure = refusal("unix:s", "409", &answer.to_string());
         assert_eq!(failure.to_string(), "axis x has no zero; find it[2J");
         assert_eq!(failure.exit_code(), 3);
-        let failure = refusal("tcp:127.0.0.1:80", "404", &Value::Null);
+        let failure = refusal("tcp:127.0.0.1:80", "404", "<html>");
         assert!(failure.to_string().contains("404"), "{failure}");
         assert_eq!(failure.exit_code(), 2);
     }

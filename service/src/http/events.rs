@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 use core::time::Duration;
 use std::collections::{BTreeSet, VecDeque};
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use axum::extract::{Query, State};
 use axum::http::HeaderMap;
@@ -11,16 +11,14 @@ use axum::response::sse::{Event as Sent, KeepAlive, Sse};
 use futures_util::stream::{self, Stream};
 use serde::Deserialize;
 use serde_json::json;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, sleep};
 use utoipa::IntoParams;
 
-use super::state::State as Shared;
+use super::state::{Closing, STREAMS, State as Shared};
 use crate::desk::Desk;
 use crate::problem::{Code, Problem, ProblemBody};
 
-/// So many streams are open at once.
-const STREAMS: usize = 16;
 /// How often a stream looks.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
@@ -29,8 +27,6 @@ const ALIVE_EVERY: Duration = Duration::from_secs(3);
 
 /// Between two samples of every axis.
 const SAMPLE_MS: core::ops::RangeInclusive<u64> = 5..=60_000;
-
-static FREE: LazyLock<Arc<Semaphore>> = LazyLock::new(|| Arc::new(Semaphore::new(STREAMS)));
 
 /// What of it is sent.
 #[derive(Debug, Default, Deserialize, IntoParams)]
@@ -52,6 +48,7 @@ struct Following {
     newest: u64,
     waiting: VecDeque<Sent>,
     sample: Option<(Duration, Instant)>,
+    closing: Closing,
     _place: OwnedSemaphorePermit,
 }
 
@@ -70,7 +67,8 @@ pub(super) async fn events(
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<Sent, Infallible>>>, Problem> {
     let Query(wanted) = wanted.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
-    let place = Arc::clone(&FREE).try_acquire_owned().map_err(|_| {
+    let place = Arc::clone(&shared.streams).try_acquire_owned();
+    let place = place.map_err(|_| {
         let what = format!("{STREAMS} event streams are open");
         Problem::new(Code::Busy, what, "close one")
     })?;
@@ -92,10 +90,11 @@ pub(super) async fn events(
         newest,
         waiting: VecDeque::new(),
         sample: every.map(|it| (it, Instant::now())),
+        closing: shared.closing,
         _place: place,
     };
     let stream = stream::unfold(following, async |mut following| {
-        let sent = following.next().await;
+        let sent = following.next().await?;
         Some((Ok(sent), following))
     });
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(ALIVE_EVERY)))
@@ -114,14 +113,24 @@ fn sampled(sample_ms: Option<u64>) -> Result<Option<Duration>, Problem> {
 }
 
 impl Following {
-    async fn next(&mut self) -> Sent {
+    /// `None` when the edge closes and all has been said.
+    async fn next(&mut self) -> Option<Sent> {
         loop {
             if let Some(sent) = self.waiting.pop_front() {
-                return sent;
+                return Some(sent);
             }
+            // Asked before the look: whatever was published before it closed is still said.
+            let is_last = self.closing.is_now();
             self.look();
-            if self.waiting.is_empty() {
-                sleep(LOOK_EVERY).await;
+            if !self.waiting.is_empty() {
+                continue;
+            }
+            if is_last {
+                return None;
+            }
+            tokio::select! {
+                () = sleep(LOOK_EVERY) => {}
+                () = self.closing.begun() => {}
             }
         }
     }

@@ -13,6 +13,7 @@ mod routes;
 mod state;
 
 use core::fmt;
+use core::pin::pin;
 use core::time::Duration;
 use std::io;
 use std::net::SocketAddr;
@@ -29,11 +30,13 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::sync::oneshot;
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::timeout;
 use tower_service::Service as _;
 
 use crate::desk::Desk;
 use door::{Connection, Door, Peer};
+use state::{Closing, State};
 
 /// Where the service is found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -124,14 +127,8 @@ impl Edge {
         let places = doors.iter().map(Door::place).collect();
         let (end, ended) = oneshot::channel();
         let thread = thread::Builder::new().name("edge".into()).spawn(move || {
-            runtime.block_on(async {
-                for door in doors {
-                    tokio::spawn(serve(door, desk.clone()));
-                }
-                // Whoever opened it has gone, or wants it to end.
-                let _ = ended.await;
-            });
-            // Open connections and event streams do not keep it.
+            runtime.block_on(serve_all(doors, desk, ended));
+            // What has not ended by now does not keep it.
             runtime.shutdown_background();
         });
         Ok(Self {
@@ -165,17 +162,47 @@ impl Drop for Edge {
 /// Whoever says half a request would keep one of the places for ever.
 const SAYING_MAX: Duration = Duration::from_secs(10);
 
-/// Ends with the runtime only.
-async fn serve(mut door: Door, desk: Desk) {
-    let app = routes::router(desk, door.is_tcp());
+/// How long an edge that closes waits for what it still has to say.
+const LAST_WORD: Duration = Duration::from_secs(1);
+
+/// Until `ended`, and until everybody has been told the last of it.
+async fn serve_all(doors: Vec<Door>, desk: Desk, ended: oneshot::Receiver<()>) {
+    let (close, closing) = watch::channel(false);
+    let (open, mut all_gone) = mpsc::channel(1);
+    let closing = Closing(closing);
+    let state = State::new(desk, closing.clone());
+    for door in doors {
+        let app = routes::router(state.clone(), door.is_tcp());
+        tokio::spawn(serve(door, app, closing.clone(), open.clone()));
+    }
+    drop(open);
+    // Whoever opened it has gone, or wants it to end.
+    let _ = ended.await;
+    close.send_replace(true);
+    // Nothing is ever sent: there is an end when the last connection has dropped its copy.
+    let _ = timeout(LAST_WORD, all_gone.recv()).await;
+}
+
+/// Held by whatever is not over yet.
+type Open = mpsc::Sender<()>;
+
+async fn serve(mut door: Door, app: Router, mut closing: Closing, open: Open) {
     loop {
-        let (connection, peer) = door.accept().await;
-        tokio::spawn(answer(connection, peer, app.clone()));
+        let (connection, peer) = tokio::select! {
+            accepted = door.accept() => accepted,
+            () = closing.begun() => return,
+        };
+        let answering = answer(connection, peer, app.clone(), closing.clone());
+        let open = open.clone();
+        tokio::spawn(async move {
+            answering.await;
+            drop(open);
+        });
     }
 }
 
 /// The requests of one connection, until it is closed or says nothing more.
-async fn answer(connection: Connection, peer: Peer, app: Router) {
+async fn answer(connection: Connection, peer: Peer, app: Router, mut closing: Closing) {
     let asked = service_fn(move |request: Request<Incoming>| {
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(ConnectInfo(peer.clone()));
@@ -185,10 +212,13 @@ async fn answer(connection: Connection, peer: Peer, app: Router) {
     server
         .timer(TokioTimer::new())
         .header_read_timeout(SAYING_MAX);
+    let mut served = pin!(server.serve_connection(TokioIo::new(connection), asked));
     // Whoever hangs up, or says what is no HTTP, is not waited for.
-    let _ = server
-        .serve_connection(TokioIo::new(connection), asked)
-        .await;
+    tokio::select! {
+        _ = served.as_mut() => return,
+        () = closing.begun() => served.as_mut().graceful_shutdown(),
+    }
+    let _ = served.await;
 }
 
 /// What the interface is, as OpenAPI 3.1.

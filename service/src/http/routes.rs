@@ -125,7 +125,7 @@ fn without_null(schema: &mut RefOr<Schema>) {
 }
 
 /// All that is served to `desk`'s clients.
-pub(super) fn router(desk: Desk, is_tcp: bool) -> Router {
+pub(super) fn router(state: State, is_tcp: bool) -> Router {
     let (router, description) = described();
     router
         .route(
@@ -146,7 +146,7 @@ pub(super) fn router(desk: Desk, is_tcp: bool) -> Router {
             )
         })
         .layer(from_fn_with_state(Guarded { is_tcp }, guard))
-        .with_state(State { desk })
+        .with_state(state)
 }
 
 /// Whether the service is alive.

@@ -24,8 +24,10 @@ pub(super) struct Board {
     pub(super) runs: Vec<Value>,
     /// The newest first.
     pub(super) events: VecDeque<String>,
-    /// Why nothing is heard, since when everything here is old.
-    pub(super) lost: Option<String>,
+    /// Why nothing is heard, as far as that was told.
+    lost: Option<String>,
+    /// For how long nothing has been heard.
+    silence: Duration,
     /// What became of a key that was pressed.
     pub(super) answer: String,
 }
@@ -60,10 +62,15 @@ impl Board {
     }
 
     /// Nothing was heard for so long.
-    pub(super) fn silent_for(&mut self, silence: Duration) {
-        if silence > SILENT && self.lost.is_none() {
-            self.lost = Some(format!("silent for {} s", silence.as_secs()));
-        }
+    pub(super) const fn silent_for(&mut self, silence: Duration) {
+        self.silence = silence;
+    }
+
+    /// Why all that is shown is old, when it is.
+    pub(super) fn why_old(&self) -> Option<String> {
+        let is_silent = self.silence > SILENT;
+        let silent = || is_silent.then(|| format!("silent for {} s", self.silence.as_secs()));
+        self.lost.clone().or_else(silent)
     }
 
     /// Those that are under way first, then the newest.
@@ -152,12 +159,18 @@ mod tests {
     fn a_connection_that_was_lost_shows_until_something_is_heard_again() {
         let mut board = Board::new("unix:s");
         board.hear(Heard::Ended);
-        assert_eq!(board.lost.as_deref(), Some("the service has ended"));
+        assert_eq!(board.why_old().as_deref(), Some("the service has ended"));
+        board.silent_for(Duration::from_secs(9));
+        assert_eq!(board.why_old().as_deref(), Some("the service has ended"));
         board.hear(Heard::Axes(json!([])));
-        assert_eq!(board.lost, None);
-        board.silent_for(Duration::from_secs(1));
-        assert_eq!(board.lost, None);
-        board.silent_for(Duration::from_secs(3));
-        assert_eq!(board.lost.as_deref(), Some("silent for 3 s"));
+        for (seconds, said) in [
+            (1, None),
+            (3, Some("silent for 3 s")),
+            (4, Some("silent for 4 s")),
+            (0, None),
+        ] {
+            board.silent_for(Duration::from_secs(seconds));
+            assert_eq!(board.why_old().as_deref(), said);
+        }
     }
 }

@@ -96,8 +96,8 @@ fn head_lines(board: &Board, looks: Looks) -> Vec<Line<'static>> {
     ))
     .bold();
     first.push_span(Span::styled(state.replace('_', " "), looks_of_state));
-    let second = if let Some(why) = &board.lost {
-        let why = one_line(why);
+    let second = if let Some(why) = board.why_old() {
+        let why = one_line(&why);
         Line::styled(
             format!("NOTHING IS HEARD, all below is old: {why}"),
             looks.bad,
