@@ -4,26 +4,41 @@
 use std::io;
 use std::process::ExitCode;
 
-use service::{Edge, Listen, Manager, Opened, Service, StartError};
+use service::{
+    Access, AccessFiles, Edge, Listen, ListenError, Manager, Opened, Service, StartError,
+};
 use truestage::{Failure, Serving};
 
 fn main() -> ExitCode {
-    truestage::main(serve, env!("TRUESTAGE_VERSION"))
+    truestage::main(
+        serve,
+        |new| {
+            let made = service::add_token(&new.file, &new.name, new.role, &new.made);
+            made.map_err(|it| refused("truestage token", &it))
+        },
+        env!("TRUESTAGE_VERSION"),
+    )
 }
 
 /// Keeps a machine until somebody ends it.
 fn serve(serving: Serving) -> Result<(), Failure> {
     let Serving {
         listen,
+        network,
         open,
         teller,
         announce,
         told,
     } = serving;
-    let places = listen.iter().map(|place| place.parse::<Listen>());
-    let places: Vec<_> = places
-        .collect::<Result<_, _>>()
-        .map_err(|it| refused("--listen", &it))?;
+    // Before the machine is touched.
+    let access = Access::open(AccessFiles {
+        certificate: network.tls_cert,
+        key: network.tls_key,
+        tokens: network.tokens,
+        everywhere: network.require_token,
+    });
+    let access = access.map_err(|it| refused("truestage serve", &it))?;
+    let places = places_of(&listen, &access).map_err(|it| refused("--listen", &it))?;
     let manager = Manager::of_environment();
     let say = |text: &str| manager.iter().for_each(|it| it.say(text));
     say("starting the machine");
@@ -43,7 +58,7 @@ fn serve(serving: Serving) -> Result<(), Failure> {
             other => refused("truestage serve", &other),
         }
     })?;
-    match Edge::open(service.desk(), &places) {
+    match Edge::open(service.desk(), &places, &access) {
         Ok(edge) => {
             let places: Vec<_> = edge.places().iter().map(ToString::to_string).collect();
             for place in &places {
@@ -72,6 +87,14 @@ fn serve(serving: Serving) -> Result<(), Failure> {
     }
 }
 
+/// Those of this computer first: verbs that find the machine in use ask at the first one.
+fn places_of(listen: &[String], access: &Access) -> Result<Vec<Listen>, ListenError> {
+    let places = listen.iter().map(|it| it.parse::<Listen>()?.settle(access));
+    let mut places: Vec<_> = places.collect::<Result<_, _>>()?;
+    places.sort_by_key(|it| matches!(it, Listen::Tls(_)));
+    Ok(places)
+}
+
 /// The machine is there for whoever asks it, whatever its manager thinks.
 fn untold(error: &io::Error) -> String {
     format!(
@@ -83,6 +106,6 @@ fn untold(error: &io::Error) -> String {
 fn refused(what: &str, why: &dyn std::error::Error) -> Failure {
     Failure::Usage {
         what: format!("{what}: {why}"),
-        help: "see `truestage serve --help`".into(),
+        help: "see `truestage help serve` and docs/service.md".into(),
     }
 }

@@ -8,6 +8,7 @@
 //! Quantities go in as a text with a unit (`"12.5mm"`) or as `{"value": 12.5, "unit": "mm"}`, and come out in the
 //! second form. Nothing here is a safety function: wire STO.
 
+mod access;
 mod desk;
 mod http;
 mod keeper;
@@ -23,6 +24,9 @@ mod snapshot;
 mod thread;
 mod view;
 
+pub use access::{
+    Access, AccessError, AccessFiles, Role, RoleError, SecretError, TlsError, TokenError, add_token,
+};
 pub use desk::Desk;
 pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;

@@ -46,8 +46,12 @@ pub enum Code {
     RunState,
     /// Too many orders are waiting.
     Busy,
+    /// Whoever asks has no token that is known.
+    Unauthorized,
     /// Whoever asks must not.
     Forbidden,
+    /// Whoever asks does so too often.
+    TooMany,
     /// The request is larger than is taken.
     TooLarge,
     /// The service ends.
@@ -85,7 +89,9 @@ impl Code {
     pub const fn status(self) -> u16 {
         match self {
             Self::BadRequest | Self::BadQuantity => 400,
+            Self::Unauthorized => 401,
             Self::Forbidden => 403,
+            Self::TooMany => 429,
             Self::NoSuchAxis
             | Self::NoSuchMotion
             | Self::NoSuchRun
@@ -131,11 +137,13 @@ impl Code {
             | Self::Calibration
             | Self::ErrorStop
             | Self::Leased
+            | Self::Unauthorized
             | Self::Forbidden
             | Self::RunState => 3,
             Self::OutOfTolerance => 5,
             Self::Stopped => 130,
             Self::Busy
+            | Self::TooMany
             | Self::Ending
             | Self::Device
             | Self::Overdue

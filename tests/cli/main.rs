@@ -14,6 +14,7 @@ mod jog;
 mod killed;
 mod manager;
 mod monitor;
+mod network;
 mod platform;
 mod programs;
 mod rotary;

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use service::{
-    AxisView, CalibrationView, Caller, Edge, Event, JogRequest, LeaseRequest, Leased, Listen,
-    MachineView, MotionView, MoveRequest, Problem, RunRequest, RunView, StopMode,
+    Access, AxisView, CalibrationView, Caller, Edge, Event, JogRequest, LeaseRequest, Leased,
+    Listen, MachineView, MotionView, MoveRequest, Problem, RunRequest, RunView, StopMode,
 };
 
 use crate::client::Client;
@@ -60,7 +60,11 @@ impl Http {
     pub(crate) fn of(stage: &Stage) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let path = folder.path().join("socket");
-        let edge = Edge::open(stage.desk.clone(), &[Listen::Unix(path.clone())]);
+        let edge = Edge::open(
+            stage.desk.clone(),
+            &[Listen::Unix(path.clone())],
+            &Access::default(),
+        );
         Self {
             path,
             gate: Arc::clone(&stage.gate),

@@ -4,5 +4,6 @@ mod client;
 mod contract;
 mod edge;
 mod http;
+mod network;
 mod stage;
 mod strangers;

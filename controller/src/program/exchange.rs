@@ -1,5 +1,6 @@
 //! One request to a service that keeps a machine, and its answer: HTTP/1.1, a connection for each.
 
+use std::env;
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -9,6 +10,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::Failure;
+use crate::program::secure;
 
 /// The longest that an answer may take: a service answers within a tick.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -16,6 +18,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const ANSWER_MAX: u64 = 16 << 20;
 /// The token of a lease, as `POST /v1/lease` gave it.
 const LEASE: &str = "TRUESTAGE_LEASE";
+/// What a service beyond this computer knows this program by, as `truestage token` printed it.
+const TOKEN: &str = "TRUESTAGE_TOKEN";
 /// A device, a bus, or a service in their place that is gone.
 pub(crate) const LOST: u8 = 4;
 
@@ -35,9 +39,14 @@ fn connect(at: &str) -> io::Result<Box<dyn Stream>> {
             stream.set_read_timeout(Some(PATIENCE))?;
             Ok(Box::new(stream))
         }
+        Some(("tls", address)) => Ok(Box::new(secure::connect(address, PATIENCE)?)),
+        Some(("https", rest)) => {
+            let address = rest.trim_start_matches('/').trim_end_matches('/');
+            Ok(Box::new(secure::connect(address, PATIENCE)?))
+        }
         _ => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            "write unix:PATH or tcp:127.0.0.1:PORT",
+            "write unix:PATH, tcp:127.0.0.1:PORT or https://HOST:PORT",
         )),
     }
 }
@@ -56,10 +65,10 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
 pub(crate) fn follow(at: &str, path: &str) -> Result<impl BufRead + use<>, Failure> {
     let gone = |error: io::Error| gone(at, path, &error);
     let stream = connect(at).map_err(gone)?;
-    let host = host_of(at);
+    let (host, rights) = (host_of(at), rights()?);
     // HTTP/1.0: the answer comes as it is, not in chunks.
     let request =
-        format!("GET {path} HTTP/1.0\r\nhost: {host}\r\naccept: text/event-stream\r\n\r\n");
+        format!("GET {path} HTTP/1.0\r\nhost: {host}\r\n{rights}accept: text/event-stream\r\n\r\n");
     let answer = Answer::to(stream, &request).map_err(gone)?;
     if answer.is_good() {
         return Ok(answer.body);
@@ -102,7 +111,9 @@ impl Answer {
 }
 
 fn host_of(at: &str) -> &str {
-    at.strip_prefix("tcp:").unwrap_or("localhost")
+    let of = |kind| at.strip_prefix(kind);
+    let host = of("tcp:").or_else(|| of("tls:")).or_else(|| of("https:"));
+    host.map_or("localhost", |it| it.trim_matches('/'))
 }
 
 /// The same of a service that has begun what this program waits for: one that is not there any more has ended meanwhile.
@@ -127,11 +138,10 @@ fn exchange(
     (method, path): (&str, &str),
     body: &str,
 ) -> Result<Value, Failure> {
-    let lease = lease_header(std::env::var_os(LEASE))?;
-    let host = host_of(at);
+    let (host, rights) = (host_of(at), rights()?);
     let length = body.len();
     let request = format!(
-        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{lease}content-length: {length}\r\n\r\n{body}"
+        "{method} {path} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n{rights}content-length: {length}\r\n\r\n{body}"
     );
     let answer = Answer::to(stream, &request).map_err(|error| gone(at, path, &error))?;
     let is_good = answer.is_good();
@@ -166,19 +176,40 @@ pub(crate) fn exit_code_of(said: &Value) -> Option<u8> {
         .and_then(|it| u8::try_from(it).ok())
 }
 
-/// What proves that this program acts for the holder of the machine's lease. From the environment: everybody on the
+/// What proves who this program acts for, and that he holds the machine's lease. From the environment: everybody on the
 /// computer can read the words of a command line.
-fn lease_header(token: Option<OsString>) -> Result<String, Failure> {
+fn rights() -> Result<String, Failure> {
+    let lease = header(
+        "truestage-lease: ",
+        LEASE,
+        "POST /v1/lease",
+        env::var_os(LEASE),
+    )?;
+    let token = header(
+        "authorization: Bearer ",
+        TOKEN,
+        "truestage token",
+        env::var_os(TOKEN),
+    )?;
+    Ok(lease + &token)
+}
+
+fn header(
+    begin: &str,
+    variable: &str,
+    giver: &str,
+    token: Option<OsString>,
+) -> Result<String, Failure> {
     let Some(token) = token.filter(|it| !it.is_empty()) else {
         return Ok(String::new());
     };
     match token.to_str() {
         Some(token) if token.bytes().all(|it| it.is_ascii_graphic()) => {
-            Ok(format!("truestage-lease: {token}\r\n"))
+            Ok(format!("{begin}{token}\r\n"))
         }
         _ => Err(Failure::Usage {
-            what: format!("{LEASE} in the environment is no token of a lease"),
-            help: "take the one that POST /v1/lease gave, or leave it out".into(),
+            what: format!("{variable} in the environment is no token"),
+            help: format!("take the one that {giver} gave, or leave it out"),
         }),
     }
 }
@@ -208,11 +239,12 @@ mod tests {
     }
 
     #[test]
-    fn a_token_of_a_lease_adds_one_header_and_nothing_else() {
-        assert_eq!(lease_header(None).unwrap(), "");
-        let header = lease_header(Some("0a1b".into())).unwrap();
-        assert_eq!(header, "truestage-lease: 0a1b\r\n");
-        let refused = lease_header(Some("x\r\nhost: y".into())).unwrap_err();
+    fn a_token_adds_one_header_and_nothing_else() {
+        let of =
+            |token: Option<&str>| header("truestage-lease: ", LEASE, "", token.map(Into::into));
+        assert_eq!(of(None).unwrap(), "");
+        assert_eq!(of(Some("0a1b")).unwrap(), "truestage-lease: 0a1b\r\n");
+        let refused = of(Some("x\r\nhost: y")).unwrap_err();
         assert!(refused.to_string().contains("TRUESTAGE_LEASE"), "{refused}");
     }
 

@@ -33,6 +33,7 @@ mod run;
 #[cfg(test)]
 mod same_figures_tests;
 mod scan;
+mod secure;
 mod serve;
 mod session;
 mod shell;
@@ -42,6 +43,7 @@ mod span;
 mod stored_tests;
 mod targets;
 mod text;
+mod token;
 mod verbs;
 mod volumetric;
 
@@ -140,6 +142,8 @@ enum Command {
     Explain(explain::ExplainArgs),
     /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
     Serve(ServeArgs),
+    /// One more who may ask a service over the network: prints a token once, and keeps its hash in a file.
+    Token(token::TokenArgs),
     /// What a machine that is kept by a service does, and its axes.
     Status(ServiceArgs),
     /// What it does as it happens: a picture on a terminal, elsewhere a line for each event.
@@ -384,17 +388,21 @@ fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failu
     }
 }
 
+use serve::Network;
 pub use serve::Serving;
+use token::NewToken;
 
 /// A machine that is kept, and where it is found.
 #[derive(Clone, Debug, Args)]
 struct ServeArgs {
     #[command(flatten)]
     machine: MachineArgs,
-    /// Where: `unix:PATH` (mode 0660), or `tcp:127.0.0.1:PORT` for everybody on this computer. May be given
-    /// several times.
+    /// Where: `unix:PATH` (mode 0660), `tcp:127.0.0.1:PORT` for everybody on this computer, or `tls:ADDRESS:PORT` for
+    /// the network, with --tls-cert, --tls-key and --tokens. May be given several times.
     #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
     listen: Vec<String>,
+    #[command(flatten)]
+    network: Network,
 }
 
 /// A service that keeps a machine.
@@ -405,9 +413,13 @@ struct ServiceArgs {
     at: String,
 }
 
-/// Runs the command line of this process; `keep` keeps a machine for `truestage serve`, and `version` is what
-/// `--version` says of this program.
-pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>, version: &'static str) -> ExitCode {
+/// Runs the command line of this process; `keep` keeps a machine for `truestage serve`, `enrol` makes a token for
+/// `truestage token` and returns it, and `version` is what `--version` says of this program.
+pub fn main(
+    keep: fn(Serving) -> Result<(), crate::Failure>,
+    enrol: fn(NewToken) -> Result<String, crate::Failure>,
+    version: &'static str,
+) -> ExitCode {
     let words = Cli::command().version(version).get_matches();
     let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
     let output = Output::new(cli.json);
@@ -448,6 +460,7 @@ pub fn main(keep: fn(Serving) -> Result<(), crate::Failure>, version: &'static s
         Command::Monitor(args) => monitor::run(&args, output),
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
+        Command::Token(args) => token::run(args, output, enrol),
         Command::Report(args) => report::run(&args, output),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(&args, Cli::command(), output),

@@ -2,7 +2,7 @@
 
 use std::any::Any;
 use std::io;
-use std::path;
+use std::path::{self, PathBuf};
 use std::sync::{Arc, OnceLock, Weak};
 
 use crate::linear::Teller;
@@ -23,8 +23,10 @@ type Announcing = dyn Fn(&[String]) -> io::Result<()>;
 
 /// What `truestage serve` is asked for: a machine that is to be kept for others.
 pub struct Serving {
-    /// Where it is to be found: `unix:PATH`, `tcp:127.0.0.1:PORT`.
+    /// Where it is to be found: `unix:PATH`, `tcp:127.0.0.1:PORT`, `tls:ADDRESS:PORT`.
     pub listen: Vec<String>,
+    /// What opens it to the network.
+    pub network: Network,
     /// Opens it; called once, on the thread that keeps it.
     pub open: Box<Opening>,
     /// Says what it gave, as the command line does.
@@ -35,17 +37,39 @@ pub struct Serving {
     pub told: Box<dyn Fn(&str)>,
 }
 
+/// What opens a service to the network.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Network {
+    /// Beyond this computer: the certificate in PEM form.
+    #[arg(long, value_name = "PEM")]
+    pub tls_cert: Option<PathBuf>,
+    /// Its key; nobody else may read the file.
+    #[arg(long, value_name = "PEM")]
+    pub tls_key: Option<PathBuf>,
+    /// Who may ask, and what: the file that `truestage token` writes.
+    #[arg(long, value_name = "FILE")]
+    pub tokens: Option<PathBuf>,
+    /// Ask for a token on the Unix socket and on loopback, too.
+    #[arg(long)]
+    pub require_token: bool,
+}
+
 /// Keeps the machine until somebody ends it.
 pub(crate) fn run(
     args: ServeArgs,
     output: Output,
     serve: fn(Serving) -> Result<(), Failure>,
 ) -> Ended {
-    let ServeArgs { machine, listen } = args;
+    let ServeArgs {
+        machine,
+        listen,
+        network,
+    } = args;
     let taken: Arc<OnceLock<Weak<Lease>>> = Arc::default();
     let lease = Arc::clone(&taken);
     serve(Serving {
         listen,
+        network,
         open: Box::new(move || {
             let session = Session::open(&machine, "serve", Use::Measurement, output)?;
             let own = Arc::new(session.lease);

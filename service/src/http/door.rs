@@ -1,8 +1,6 @@
-//! Where connections come in: a Unix socket or TCP on loopback, no more of them than are served.
+//! Where connections come in: a Unix socket, TCP on loopback, or TCP with TLS.
 
 use core::fmt;
-use core::pin::Pin;
-use core::task::{Context, Poll};
 use std::fs;
 use std::io;
 use std::net::SocketAddr;
@@ -11,14 +9,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use axum::serve::Listener;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::{TcpListener, UnixListener};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 
-use super::Listen;
+use super::place::Listen;
+use crate::access::{Access, Tls};
 
-/// So many connections are served at once at each door; others wait in the system's queue.
-const CONNECTIONS: usize = 64;
 /// Who may connect to the Unix socket: its owner and its group.
 const MODE: u32 = 0o660;
 
@@ -27,7 +22,7 @@ const MODE: u32 = 0o660;
 pub(crate) enum Peer {
     /// A user of this computer.
     User(Option<u32>),
-    /// A program on this computer.
+    /// A program somewhere.
     Address(SocketAddr),
 }
 
@@ -42,43 +37,79 @@ impl fmt::Display for Peer {
 }
 
 enum Inner {
-    Unix(UnixListener, Listen),
-    Tcp(TcpListener, Listen),
+    Unix(UnixListener),
+    Tcp(TcpListener),
+    Tls(TcpListener, Arc<Tls>),
+}
+
+/// What has come in, and nothing was said yet.
+pub(crate) enum Socket {
+    Unix(UnixStream),
+    Tcp(TcpStream),
+    Tls(TcpStream, Arc<Tls>),
 }
 
 /// Where connections come in.
 pub(crate) struct Door {
     inner: Inner,
-    free: Arc<Semaphore>,
+    place: Listen,
 }
 
 impl Door {
-    /// Must be called within a runtime.
-    pub(crate) fn open(place: &Listen) -> io::Result<Self> {
-        let inner = match place {
-            Listen::Unix(path) => Inner::Unix(bind(path)?, place.clone()),
+    /// Must be called within a runtime, with a place that was settled with `access`.
+    pub(crate) fn open(place: &Listen, access: &Access) -> io::Result<Self> {
+        let (inner, place) = match place {
+            Listen::Unix(path) => (Inner::Unix(bind(path)?), place.clone()),
             Listen::Tcp(address) => {
-                let listener = std::net::TcpListener::bind(address)?;
-                listener.set_nonblocking(true)?;
-                let place = Listen::Tcp(listener.local_addr()?);
-                Inner::Tcp(TcpListener::from_std(listener)?, place)
+                let (listener, address) = listen(*address)?;
+                (Inner::Tcp(listener), Listen::Tcp(address))
+            }
+            Listen::Tls(address) => {
+                let without =
+                    || io::Error::new(io::ErrorKind::InvalidInput, "there is no certificate");
+                let tls = access.tls.clone().ok_or_else(without)?;
+                let (listener, address) = listen(*address)?;
+                (Inner::Tls(listener, tls), Listen::Tls(address))
             }
         };
-        Ok(Self {
-            inner,
-            free: Arc::new(Semaphore::new(CONNECTIONS)),
-        })
+        Ok(Self { inner, place })
     }
 
-    pub(crate) fn place(&self) -> Listen {
-        match &self.inner {
-            Inner::Unix(_, place) | Inner::Tcp(_, place) => place.clone(),
+    pub(crate) const fn place(&self) -> &Listen {
+        &self.place
+    }
+
+    pub(crate) async fn accept(&mut self) -> (Socket, Peer) {
+        match &mut self.inner {
+            Inner::Unix(listener) => {
+                let (stream, _) = Listener::accept(listener).await;
+                let uid = stream.peer_cred().ok().map(|it| it.uid());
+                (Socket::Unix(stream), Peer::User(uid))
+            }
+            Inner::Tcp(listener) => {
+                let (stream, peer) = accept_tcp(listener).await;
+                (Socket::Tcp(stream), peer)
+            }
+            Inner::Tls(listener, tls) => {
+                let (stream, peer) = accept_tcp(listener).await;
+                (Socket::Tls(stream, Arc::clone(tls)), peer)
+            }
         }
     }
+}
 
-    pub(crate) const fn is_tcp(&self) -> bool {
-        matches!(self.inner, Inner::Tcp(..))
-    }
+fn listen(address: SocketAddr) -> io::Result<(TcpListener, SocketAddr)> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    let address = listener.local_addr()?;
+    Ok((TcpListener::from_std(listener)?, address))
+}
+
+async fn accept_tcp(listener: &mut TcpListener) -> (TcpStream, Peer) {
+    let (stream, address) = Listener::accept(listener).await;
+    // An answer that waits for more to say is late.
+    let _ = stream.set_nodelay(true);
+    (stream, Peer::Address(address))
 }
 
 /// A socket that a service which ended badly left behind is replaced; one that answers is not.
@@ -94,74 +125,4 @@ fn bind(path: &Path) -> io::Result<UnixListener> {
     let listener = UnixListener::bind(path)?;
     fs::set_permissions(path, fs::Permissions::from_mode(MODE))?;
     Ok(listener)
-}
-
-trait Socket: AsyncRead + AsyncWrite + Send {}
-
-impl<S: AsyncRead + AsyncWrite + Send> Socket for S {}
-
-/// A connection, which gives its place back when it ends.
-pub(crate) struct Connection {
-    socket: Pin<Box<dyn Socket>>,
-    _place: Option<OwnedSemaphorePermit>,
-}
-
-impl Listener for Door {
-    type Io = Connection;
-    type Addr = Peer;
-
-    async fn accept(&mut self) -> (Connection, Peer) {
-        // The semaphore is never closed.
-        let place = Arc::clone(&self.free).acquire_owned().await.ok();
-        let (socket, peer): (Pin<Box<dyn Socket>>, _) = match &mut self.inner {
-            Inner::Unix(listener, _) => {
-                let (stream, _) = Listener::accept(listener).await;
-                let uid = stream.peer_cred().ok().map(|it| it.uid());
-                (Box::pin(stream), Peer::User(uid))
-            }
-            Inner::Tcp(listener, _) => {
-                let (stream, address) = Listener::accept(listener).await;
-                // An answer that waits for more to say is late.
-                let _ = stream.set_nodelay(true);
-                (Box::pin(stream), Peer::Address(address))
-            }
-        };
-        let connection = Connection {
-            socket,
-            _place: place,
-        };
-        (connection, peer)
-    }
-
-    fn local_addr(&self) -> io::Result<Peer> {
-        Ok(Peer::User(None))
-    }
-}
-
-impl AsyncRead for Connection {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        self.socket.as_mut().poll_read(context, buffer)
-    }
-}
-
-impl AsyncWrite for Connection {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        self.socket.as_mut().poll_write(context, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.socket.as_mut().poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.socket.as_mut().poll_shutdown(context)
-    }
 }

@@ -5,6 +5,7 @@ use core::time::Duration;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use axum::Extension;
 use axum::extract::{Query, State};
 use axum::http::HeaderMap;
 use axum::response::sse::{Event as Sent, KeepAlive, Sse};
@@ -15,6 +16,7 @@ use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, sleep};
 use utoipa::IntoParams;
 
+use super::places::{Heard, Keeps};
 use super::state::{Closing, STREAMS, State as Shared};
 use crate::desk::Desk;
 use crate::problem::{Code, Problem, ProblemBody};
@@ -49,7 +51,9 @@ struct Following {
     waiting: VecDeque<Sent>,
     sample: Option<(Duration, Instant)>,
     closing: Closing,
-    _place: OwnedSemaphorePermit,
+    _stream: OwnedSemaphorePermit,
+    /// Its connection keeps its place among the others.
+    _heard: Option<Heard>,
 }
 
 /// Events as they happen.
@@ -64,6 +68,7 @@ struct Following {
 pub(super) async fn events(
     State(shared): State<Shared>,
     wanted: Result<Query<Wanted>, axum::extract::rejection::QueryRejection>,
+    keeps: Option<Extension<Keeps>>,
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<Sent, Infallible>>>, Problem> {
     let Query(wanted) = wanted.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
@@ -91,7 +96,8 @@ pub(super) async fn events(
         waiting: VecDeque::new(),
         sample: every.map(|it| (it, Instant::now())),
         closing: shared.closing,
-        _place: place,
+        _stream: place,
+        _heard: keeps.map(|Extension(it)| it.heard()),
     };
     let stream = stream::unfold(following, async |mut following| {
         let sent = following.next().await?;

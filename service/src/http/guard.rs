@@ -6,7 +6,7 @@ use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
@@ -15,6 +15,11 @@ use tokio::time::timeout;
 use utoipa::IntoParams;
 
 use super::door::Peer;
+use super::identity::{Admitted, Identities};
+use super::needs::{enough, needed};
+use super::place::Listen;
+use super::places::Keeps;
+use crate::access::Access;
 use crate::problem::{Code, Problem};
 use crate::request::Caller;
 
@@ -38,33 +43,91 @@ impl IntoResponse for Problem {
         let status = StatusCode::from_u16(self.code.status());
         let status = status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let kind = [(header::CONTENT_TYPE, "application/problem+json")];
-        (status, kind, Json(self)).into_response()
+        let more = match self.code {
+            // A browser asks whoever looks at it for a name and a password: the token is the password.
+            Code::Unauthorized => vec![
+                (header::WWW_AUTHENTICATE, r#"Bearer realm="truestage""#),
+                (
+                    header::WWW_AUTHENTICATE,
+                    r#"Basic realm="truestage: the token is the password""#,
+                ),
+            ],
+            Code::TooMany => vec![(header::RETRY_AFTER, "1")],
+            _ => Vec::new(),
+        };
+        let mut response = (status, kind, Json(self)).into_response();
+        for (name, value) in more {
+            let value = HeaderValue::from_static(value);
+            response.headers_mut().append(name, value);
+        }
+        response
     }
 }
 
-/// Whether a page in a browser, which may come from anywhere, is kept out.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Guarded {
-    /// Over TCP every page on this computer could ask; nobody's page opens a Unix socket.
-    pub(super) is_tcp: bool,
+/// How a page in a browser, which may come from anywhere, is kept out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pages {
+    /// Nobody's page opens a Unix socket.
+    None,
+    /// Every page on this computer could ask: host and origin must be this computer's.
+    OfThisComputer,
+    /// Whoever asks has a certificate's name and a token: the origin must be the place itself.
+    OfItsName,
 }
 
-/// Host and Origin must be this computer's: a name that was made to point here is not.
+/// Who is let in at a door.
+#[derive(Clone)]
+pub(super) struct Guarded {
+    pages: Pages,
+    identities: Identities,
+}
+
+impl Guarded {
+    pub(super) fn new(place: &Listen, access: &Access) -> Self {
+        let (pages, is_beyond) = match place {
+            Listen::Unix(_) => (Pages::None, false),
+            Listen::Tcp(_) => (Pages::OfThisComputer, false),
+            Listen::Tls(_) => (Pages::OfItsName, true),
+        };
+        Self {
+            pages,
+            identities: Identities::new(access, is_beyond),
+        }
+    }
+
+    fn admit(&self, request: &Request) -> Result<Admitted, Problem> {
+        let (headers, uri) = (request.headers(), request.uri());
+        check(self.pages, headers)?;
+        let peer = request.extensions().get::<ConnectInfo<Peer>>();
+        let peer = peer.map_or_else(|| "unknown".to_owned(), |it| it.0.to_string());
+        let admitted = self.identities.admit(&peer, headers, uri.path())?;
+        enough(admitted.role, needed(request.method(), uri.path()))?;
+        Ok(admitted)
+    }
+}
+
+/// Whoever asks is let in or told why not; what he says is heard as a whole first.
 pub(super) async fn guard(
     State(guarded): State<Guarded>,
     request: Request,
     next: Next,
 ) -> Response {
-    let allowed = check(guarded, request.headers());
-    let (parts, body) = request.into_parts();
+    let admitted = guarded.admit(&request);
+    let (mut parts, body) = request.into_parts();
     // Who is answered before he has said all may never hear it.
     let whole = timeout(BODY_TIME, whole(body)).await;
     let whole = whole.unwrap_or_else(|_| {
         let what = format!("the request had not come as a whole after {BODY_TIME:?}");
         Err(Problem::new(Code::BadRequest, what, "send it faster"))
     });
-    match allowed.and(whole) {
-        Ok(body) => next.run(Request::from_parts(parts, body.into())).await,
+    match admitted.and_then(|it| Ok((it, whole?))) {
+        Ok((admitted, body)) => {
+            // An order is carried out whoever else comes; whoever only waits for something makes room.
+            let keeps = parts.extensions.get::<Keeps>();
+            let _heard = keeps.filter(|_| !parts.method.is_safe()).map(Keeps::heard);
+            parts.extensions.insert(admitted);
+            next.run(Request::from_parts(parts, body.into())).await
+        }
         Err(problem) => problem.into_response(),
     }
 }
@@ -90,10 +153,15 @@ async fn whole(body: axum::body::Body) -> Result<Vec<u8>, Problem> {
     Err(Problem::new(Code::TooLarge, what, ""))
 }
 
-fn check(guarded: Guarded, headers: &HeaderMap) -> Result<(), Problem> {
+fn check(pages: Pages, headers: &HeaderMap) -> Result<(), Problem> {
+    let scheme = match pages {
+        Pages::None => return Ok(()),
+        Pages::OfThisComputer => "http",
+        Pages::OfItsName => "https",
+    };
     let text = |name| headers.get(name).map(|it| it.to_str().unwrap_or_default());
     let host = text(header::HOST);
-    if guarded.is_tcp && !host.is_some_and(is_own_host) {
+    if pages == Pages::OfThisComputer && !host.is_some_and(is_own_host) {
         let what = "the Host of this request is not this computer";
         return Err(Problem::new(
             Code::Forbidden,
@@ -102,8 +170,8 @@ fn check(guarded: Guarded, headers: &HeaderMap) -> Result<(), Problem> {
         ));
     }
     let origin = text(header::ORIGIN);
-    let own = host.map(|host| format!("http://{host}"));
-    if guarded.is_tcp && origin.is_some() && origin != own.as_deref() {
+    let own = host.map(|host| format!("{scheme}://{host}"));
+    if origin.is_some() && origin != own.as_deref() {
         let what = "a page from elsewhere must not ask this service";
         return Err(Problem::new(Code::Forbidden, what, ""));
     }
@@ -118,7 +186,7 @@ fn is_own_host(host: &str) -> bool {
     matches!(name, "localhost" | "127.0.0.1" | "[::1]")
 }
 
-/// Who asks: by the header `Truestage-Client`, or by the connection.
+/// Who asks: the owner of the token, or by the header `Truestage-Client`, or by the connection.
 #[derive(Clone, Debug)]
 pub(super) struct By(pub(super) Caller);
 
@@ -129,8 +197,11 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
         let text = |name: &str| parts.headers.get(name).and_then(|it| it.to_str().ok());
         let peer = parts.extensions.get::<ConnectInfo<Peer>>();
         let peer = peer.map_or_else(|| "unknown".to_owned(), |it| it.0.to_string());
-        let name = match text(CLIENT).map(plain) {
-            Some(name) if !name.is_empty() => name,
+        let admitted = parts.extensions.get::<Admitted>();
+        let owner = admitted.and_then(|it| it.owner.clone());
+        let name = match (owner, text(CLIENT).map(plain)) {
+            (Some(owner), _) => owner,
+            (None, Some(name)) if !name.is_empty() => name,
             _ => peer,
         };
         let lease = text(LEASE).map(str::to_owned);
@@ -143,7 +214,8 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
 #[into_params(parameter_in = Header)]
 #[expect(dead_code, reason = "the description alone reads it")]
 pub(super) struct Asks {
-    /// Who asks, for people: events and ends of motions say it. Where the connection comes from when left out.
+    /// Who asks, for people: events and ends of motions say it. Where the connection comes from when left out; the
+    /// owner of the token where there is one.
     #[param(rename = "Truestage-Client")]
     client: Option<String>,
     /// The token of the lease; without it orders are refused while somebody else has the lease.
@@ -204,37 +276,53 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
 mod tests {
     use super::*;
 
-    fn checked(is_tcp: bool, host: &str, origin: Option<&str>) -> bool {
+    fn checked(pages: Pages, host: &str, origin: Option<&str>) -> bool {
         let mut headers = HeaderMap::new();
         headers.insert(header::HOST, host.parse().unwrap());
         if let Some(origin) = origin {
             headers.insert(header::ORIGIN, origin.parse().unwrap());
         }
-        check(Guarded { is_tcp }, &headers).is_ok()
+        check(pages, &headers).is_ok()
     }
 
     #[test]
     fn a_page_from_elsewhere_and_a_name_that_points_here_are_kept_out() {
-        assert!(checked(true, "127.0.0.1:8470", None));
-        assert!(checked(true, "localhost", None));
-        assert!(checked(true, "[::1]:8470", Some("http://[::1]:8470")));
-        assert!(!checked(true, "evil.example", None));
-        assert!(!checked(true, "127.0.0.1.evil.example:8470", None));
+        assert!(checked(Pages::OfThisComputer, "127.0.0.1:8470", None));
+        assert!(checked(Pages::OfThisComputer, "localhost", None));
+        assert!(checked(
+            Pages::OfThisComputer,
+            "[::1]:8470",
+            Some("http://[::1]:8470")
+        ));
+        assert!(!checked(Pages::OfThisComputer, "evil.example", None));
         assert!(!checked(
-            true,
+            Pages::OfThisComputer,
+            "127.0.0.1.evil.example:8470",
+            None
+        ));
+        assert!(!checked(
+            Pages::OfThisComputer,
             "127.0.0.1:8470",
             Some("http://evil.example")
         ));
         assert!(!checked(
-            true,
+            Pages::OfThisComputer,
             "127.0.0.1:8470",
             Some("http://127.0.0.1:80")
         ));
-        assert!(!checked(true, "127.0.0.1:8470", Some("null")));
+        assert!(!checked(
+            Pages::OfThisComputer,
+            "127.0.0.1:8470",
+            Some("null")
+        ));
         assert!(
-            checked(false, "anything", None),
+            checked(Pages::None, "anything", None),
             "nobody's page opens a Unix socket"
         );
+        let named = |origin| checked(Pages::OfItsName, "stage-7.lab:8470", origin);
+        assert!(named(None) && named(Some("https://stage-7.lab:8470")));
+        assert!(!named(Some("http://stage-7.lab:8470")));
+        assert!(!named(Some("https://evil.example")));
     }
 
     #[test]

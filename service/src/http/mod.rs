@@ -2,29 +2,29 @@
 //! never waits for it.
 //!
 //! One thread, one tokio runtime of its own. Errors are problems by RFC 9457, `/openapi.json` says what there is.
-//! Absent: TLS and tokens, so TCP is bound to loopback addresses only.
 
+mod connection;
 mod door;
 mod events;
 mod guard;
+mod identity;
 mod metrics;
+mod needs;
 mod page;
+mod place;
+mod places;
+mod rate;
 mod routes;
 mod state;
 
-use core::fmt;
 use core::pin::pin;
 use core::time::Duration;
 use std::io;
-use std::net::SocketAddr;
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::thread::{self, JoinHandle};
 
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ConnectInfo;
-use axum::serve::Listener as _;
 use hyper::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
@@ -34,55 +34,14 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::timeout;
 use tower_service::Service as _;
 
+use crate::access::Access;
 use crate::desk::Desk;
-use door::{Connection, Door, Peer};
+use connection::Connection;
+use door::{Door, Peer, Socket};
+use guard::Guarded;
+pub use place::{Listen, ListenError};
+use places::{Place, Places};
 use state::{Closing, State};
-
-/// Where the service is found.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Listen {
-    /// A Unix socket, mode 0660.
-    Unix(PathBuf),
-    /// TCP on a loopback address.
-    Tcp(SocketAddr),
-}
-
-/// A place that is none.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{seen}` is no place to listen; write unix:PATH or tcp:127.0.0.1:PORT (TCP on loopback only)"
-)]
-pub struct ListenError {
-    seen: String,
-}
-
-impl FromStr for Listen {
-    type Err = ListenError;
-
-    fn from_str(text: &str) -> Result<Self, ListenError> {
-        let wrong = || ListenError {
-            seen: text.to_owned(),
-        };
-        match text.split_once(':').ok_or_else(wrong)? {
-            ("unix", path) if !path.is_empty() => Ok(Self::Unix(path.into())),
-            ("tcp", address) => {
-                let address: SocketAddr = address.parse().map_err(|_| wrong())?;
-                let is_loopback = address.ip().is_loopback();
-                is_loopback.then_some(Self::Tcp(address)).ok_or_else(wrong)
-            }
-            _ => Err(wrong()),
-        }
-    }
-}
-
-impl fmt::Display for Listen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unix(path) => write!(f, "unix:{}", path.display()),
-            Self::Tcp(address) => write!(f, "tcp:{address}"),
-        }
-    }
-}
 
 /// A place that cannot be listened at.
 #[derive(Debug, thiserror::Error)]
@@ -103,11 +62,11 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// Serves what `desk` knows at each of `places`.
+    /// Serves what `desk` knows at each of `places` to whom `access` lets in.
     ///
     /// # Errors
-    /// When one of them cannot be listened at.
-    pub fn open(desk: Desk, places: &[Listen]) -> Result<Self, EdgeError> {
+    /// When one of them cannot be listened at, or is open to others than `access` can tell apart.
+    pub fn open(desk: Desk, places: &[Listen], access: &Access) -> Result<Self, EdgeError> {
         let failed = |at: &str| {
             let at = at.to_owned();
             move |source| EdgeError { at, source }
@@ -119,15 +78,19 @@ impl Edge {
             .map_err(failed("tokio"))?;
         let inside = runtime.enter();
         let doors = places.iter().map(|place| {
-            let door = Door::open(place);
-            door.map_err(failed(&place.to_string()))
+            let at = place.to_string();
+            let open = |error| io::Error::new(io::ErrorKind::PermissionDenied, error);
+            let settled = place.clone().settle(access).map_err(open);
+            let door = settled.and_then(|it| Door::open(&it, access));
+            door.map_err(failed(&at))
         });
         let doors: Vec<_> = doors.collect::<Result<_, _>>()?;
         drop(inside);
-        let places = doors.iter().map(Door::place).collect();
+        let places = doors.iter().map(|it| it.place().clone()).collect();
+        let access = access.clone();
         let (end, ended) = oneshot::channel();
         let thread = thread::Builder::new().name("edge".into()).spawn(move || {
-            runtime.block_on(serve_all(doors, desk, ended));
+            runtime.block_on(serve_all(doors, desk, access, ended));
             // What has not ended by now does not keep it.
             runtime.shutdown_background();
         });
@@ -165,14 +128,20 @@ const SAYING_MAX: Duration = Duration::from_secs(10);
 /// How long an edge that closes waits for what it still has to say.
 const LAST_WORD: Duration = Duration::from_secs(1);
 
+/// So many connections are served at once at each door.
+const CONNECTIONS: usize = 64;
+/// So long all that is said before a body may be, in bytes.
+const HEAD_MAX: usize = 32 << 10;
+
 /// Until `ended`, and until everybody has been told the last of it.
-async fn serve_all(doors: Vec<Door>, desk: Desk, ended: oneshot::Receiver<()>) {
+async fn serve_all(doors: Vec<Door>, desk: Desk, access: Access, ended: oneshot::Receiver<()>) {
     let (close, closing) = watch::channel(false);
     let (open, mut all_gone) = mpsc::channel(1);
     let closing = Closing(closing);
     let state = State::new(desk, closing.clone());
     for door in doors {
-        let app = routes::router(state.clone(), door.is_tcp());
+        let guarded = Guarded::new(door.place(), &access);
+        let app = routes::router(state.clone(), guarded);
         tokio::spawn(serve(door, app, closing.clone(), open.clone()));
     }
     drop(open);
@@ -187,33 +156,42 @@ async fn serve_all(doors: Vec<Door>, desk: Desk, ended: oneshot::Receiver<()>) {
 type Open = mpsc::Sender<()>;
 
 async fn serve(mut door: Door, app: Router, mut closing: Closing, open: Open) {
+    let places = Places::new(CONNECTIONS);
     loop {
-        let (connection, peer) = tokio::select! {
-            accepted = door.accept() => accepted,
+        let ((socket, peer), place) = tokio::select! {
+            accepted = async { (door.accept().await, places.take().await) } => accepted,
             () = closing.begun() => return,
         };
-        let answering = answer(connection, peer, app.clone(), closing.clone());
-        let open = open.clone();
+        let (app, closing, open) = (app.clone(), closing.clone(), open.clone());
         tokio::spawn(async move {
-            answering.await;
+            tokio::select! {
+                () = answer(socket, peer, &place, app, closing) => {}
+                () = place.lost() => {}
+            }
             drop(open);
         });
     }
 }
 
 /// The requests of one connection, until it is closed or says nothing more.
-async fn answer(connection: Connection, peer: Peer, app: Router, mut closing: Closing) {
+async fn answer(socket: Socket, peer: Peer, place: &Place, app: Router, mut closing: Closing) {
+    // Whoever hangs up, or says what is no TLS or no HTTP, is not waited for.
+    let Ok(connection) = Connection::of(socket).await else {
+        return;
+    };
+    let keeps = place.keeps();
     let asked = service_fn(move |request: Request<Incoming>| {
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(ConnectInfo(peer.clone()));
+        request.extensions_mut().insert(keeps.clone());
         app.clone().call(request)
     });
     let mut server = http1::Builder::new();
     server
         .timer(TokioTimer::new())
-        .header_read_timeout(SAYING_MAX);
+        .header_read_timeout(SAYING_MAX)
+        .max_buf_size(HEAD_MAX);
     let mut served = pin!(server.serve_connection(TokioIo::new(connection), asked));
-    // Whoever hangs up, or says what is no HTTP, is not waited for.
     tokio::select! {
         _ = served.as_mut() => return,
         () = closing.begun() => served.as_mut().graceful_shutdown(),
@@ -229,27 +207,6 @@ pub fn openapi() -> utoipa::openapi::OpenApi {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nobody_listens_to_the_network() {
-        for text in [
-            "tcp:0.0.0.0:1",
-            "tcp:192.168.0.1:80",
-            "tcp:[::]:1",
-            "tcp:1",
-            "unix:",
-            "http",
-        ] {
-            assert!(text.parse::<Listen>().is_err(), "{text}");
-        }
-        for text in [
-            "tcp:127.0.0.1:8470",
-            "tcp:[::1]:8470",
-            "unix:/run/truestage.sock",
-        ] {
-            assert_eq!(text.parse::<Listen>().unwrap().to_string(), text);
-        }
-    }
 
     /// What is not in the description is not part of the interface.
     #[test]

@@ -5,6 +5,7 @@ mod journals;
 mod machine;
 mod motions;
 mod runs;
+mod secured;
 
 use core::time::Duration;
 
@@ -57,6 +58,7 @@ struct Described;
 pub(super) fn described() -> (Router<State>, OpenApi) {
     let (router, mut description) = routed();
     precise(&mut description);
+    secured::describe(&mut description);
     (router, description)
 }
 
@@ -125,7 +127,7 @@ fn without_null(schema: &mut RefOr<Schema>) {
 }
 
 /// All that is served to `desk`'s clients.
-pub(super) fn router(state: State, is_tcp: bool) -> Router {
+pub(super) fn router(state: State, guarded: Guarded) -> Router {
     let (router, description) = described();
     router
         .route(
@@ -145,7 +147,7 @@ pub(super) fn router(state: State, is_tcp: bool) -> Router {
                 "GET /openapi.json says what there is",
             )
         })
-        .layer(from_fn_with_state(Guarded { is_tcp }, guard))
+        .layer(from_fn_with_state(guarded, guard))
         .with_state(state)
 }
 
@@ -209,6 +211,24 @@ pub(super) type MaybeQuery<T> =
 pub(super) fn query<T>(query: MaybeQuery<T>) -> Result<T, Problem> {
     let read = query.map(|it| it.0);
     read.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))
+}
+
+/// How often an order that must not be lost is given again while too many others wait.
+const AGAIN: u32 = 500;
+
+/// The same of a stop: that too many orders of others wait does not keep it away.
+pub(super) async fn obey_at_last(
+    desk: &Desk,
+    caller: &Caller,
+    order: Order,
+) -> Result<Answer, Problem> {
+    for _ in 0..AGAIN {
+        match desk.give(caller, order.clone()) {
+            Err(problem) if problem.code == Code::Busy => tokio::time::sleep(LOOK_EVERY).await,
+            given => return given?.answer().await,
+        }
+    }
+    obey(desk, caller, order).await
 }
 
 /// Gives an order and waits for its answer, without keeping anybody else waiting.

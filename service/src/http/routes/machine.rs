@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::super::guard::{Asks, Body, By, NAME_MAX, Named, plain};
+use super::super::identity::Admitted;
 use super::super::state::State;
-use super::obey;
+use super::{obey, obey_at_last};
 use crate::desk::Desk;
 use crate::order::{Answer, Order};
 use crate::problem::{Code, Problem, ProblemBody};
@@ -128,7 +129,7 @@ pub(super) async fn stop(
     body: Result<Body<StopRequest>, Problem>,
 ) -> Result<Json<Done>, Problem> {
     let mode = body?.0.mode;
-    obey(&state.desk, &caller, Order::Stop { mode }).await?;
+    obey_at_last(&state.desk, &caller, Order::Stop { mode }).await?;
     Ok(DONE)
 }
 
@@ -161,6 +162,7 @@ pub(super) async fn reset(
 pub(super) async fn lease(
     Of(state): Of<State>,
     By(caller): By,
+    admitted: Admitted,
     Body(mut request): Body<LeaseRequest>,
 ) -> Result<Json<Leased>, Problem> {
     let length = request.name.chars().count();
@@ -171,8 +173,10 @@ pub(super) async fn lease(
         );
         return Err(Problem::new(Code::BadRequest, what, ""));
     }
-    request.name = Some(plain(&request.name))
-        .filter(|it| !it.is_empty())
+    // Whoever has a token has its name, whatever he calls himself.
+    request.name = admitted
+        .owner
+        .or_else(|| Some(plain(&request.name)).filter(|it| !it.is_empty()))
         .unwrap_or_else(|| caller.name.clone());
     let order = Desk::lease_order(&request)?;
     match obey(&state.desk, &caller, order).await? {

@@ -6,6 +6,8 @@ use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 
 use super::super::guard::{Asks, Body, By, Named};
+use super::super::identity::Admitted;
+use super::super::needs::{enough, of_run};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
 use crate::order::Order;
@@ -34,8 +36,10 @@ pub(super) async fn runs(Of(state): Of<State>) -> Json<Vec<RunView>> {
 pub(super) async fn plan(
     Of(state): Of<State>,
     By(caller): By,
+    admitted: Admitted,
     Body(request): Body<RunRequest>,
 ) -> Result<impl IntoResponse, Problem> {
+    enough(admitted.role, of_run(request.kind))?;
     let id = state.desk.next_run();
     let order = Order::Plan {
         id: id.clone(),
@@ -75,8 +79,10 @@ pub(super) async fn run(
 pub(super) async fn start(
     Of(state): Of<State>,
     By(caller): By,
+    admitted: Admitted,
     Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
+    enough(admitted.role, of_run(state.desk.run(&id)?.kind))?;
     obey(&state.desk, &caller, Order::Start { run: id.clone() }).await?;
     Ok(Json(state.desk.run(&id)?))
 }
@@ -129,8 +135,10 @@ pub(super) async fn pause(
 pub(super) async fn resume(
     Of(state): Of<State>,
     By(caller): By,
+    admitted: Admitted,
     Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
+    enough(admitted.role, of_run(state.desk.run(&id)?.kind))?;
     obey(&state.desk, &caller, Order::Resume { run: id.clone() }).await?;
     Ok(Json(state.desk.run(&id)?))
 }
