@@ -8,11 +8,13 @@
 //! such as a calibration or the place of a plate, does not belong in this crate: each kind is a
 //! handle of its own over the machine (docs/decisions/0020).
 
+mod bus_account;
 mod bus_text;
 mod bus_watch;
 mod devices;
 pub mod engine;
 mod failure;
+mod figures;
 mod host_watch;
 mod instruments;
 mod looking;
@@ -37,10 +39,12 @@ mod turning;
 mod unit;
 mod waiting;
 
+pub use bus_account::BusCounts;
 pub use bus_text::{identifier_text, link_text};
 pub use devices::Devices;
 pub use engine::{Desk, Engine, EngineFailure};
 pub use failure::{Failure, Layered};
+pub use figures::{BusFigures, bus_figures, temperatures};
 pub use machine::{Attendant, Machine, attend};
 pub use moving::Moving;
 pub use observer::{Observer, Silent, Stage};

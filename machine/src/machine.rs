@@ -13,6 +13,7 @@ use units::{Metres, Time};
 use wire::Port;
 use wire::cia402::PowerState;
 
+use crate::bus_account::BusAccount;
 use crate::bus_watch::BusWatch;
 use crate::devices::Devices;
 use crate::failure::Failure;
@@ -85,6 +86,7 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
+    pub(crate) bus_account: BusAccount,
     pub(crate) host_watch: HostWatch,
     /// The instruments and cameras that were started, by name.
     pub(crate) started_instruments: BTreeSet<String>,
@@ -111,6 +113,7 @@ impl Machine {
         Self {
             heartbeats: parts.buses.iter().map(heartbeat).collect(),
             bus_watch: BusWatch::new(&parts.buses),
+            bus_account: BusAccount::new(&parts.buses),
             host_watch: HostWatch::default(),
             approach: vec![ApproachTracker::new(); axes.len()],
             zeroed: vec![false; axes.len() + parts.rotaries.len()],

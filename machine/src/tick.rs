@@ -83,6 +83,7 @@ impl Machine {
     }
 
     pub(crate) fn take(&mut self, arrival: &Arrival) -> Result<(), Failure> {
+        self.bus_account.heard(arrival);
         self.devices.each(|port, device| {
             if port == arrival.port {
                 device.handle(arrival.at, &arrival.input);
@@ -155,6 +156,7 @@ impl Machine {
     }
 
     fn send(&mut self, port: Port, payload: Payload, sender: Sender) -> Result<(), Failure> {
+        self.bus_account.sent(port, &payload);
         let sent = self
             .outbox
             .send(&mut *self.transport, port, payload, sender);

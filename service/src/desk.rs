@@ -17,6 +17,7 @@ use machine::records::Store;
 use tokio::sync::oneshot;
 use truestage::Failure;
 
+use crate::figures::Figures;
 use crate::keeper::utc_now;
 use crate::ledger::{Asked, Ledger, LedgerError};
 use crate::order::{Answer, Answered, Letter, Order};
@@ -425,6 +426,11 @@ impl Desk {
         let snapshot = self.snapshot();
         let newer = snapshot.events.iter().filter(|it| it.id > after);
         newer.map(|it| Event::clone(it)).collect()
+    }
+
+    /// How punctual SYNCs are, how full the buses, how warm it is; at most a second old.
+    pub fn figures(&self) -> Arc<Figures> {
+        self.snapshot().figures
     }
 
     /// What the devices counted: device, what, how often.

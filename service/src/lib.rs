@@ -10,6 +10,7 @@
 
 mod access;
 mod desk;
+mod figures;
 mod http;
 mod keeper;
 mod ledger;
@@ -28,6 +29,7 @@ pub use access::{
     Access, AccessError, AccessFiles, Role, RoleError, SecretError, TlsError, TokenError, add_token,
 };
 pub use desk::Desk;
+pub use figures::{Figures, Minute};
 pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
 pub use manager::Manager;

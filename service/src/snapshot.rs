@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use units::{Metres, Time};
 
+use crate::figures::Figures;
 use crate::quantity::Quantity;
 use crate::view::{
     AxisState, AxisView, Cause, Event, LeaseView, MachineState, MachineView, MotionView, RunView,
@@ -63,6 +64,7 @@ pub(crate) struct Snapshot {
     pub(crate) events: Arc<Vec<Arc<Event>>>,
     pub(crate) lease: Option<(Arc<str>, Time)>,
     pub(crate) counters: Arc<Vec<(String, &'static str, u64)>>,
+    pub(crate) figures: Arc<Figures>,
     pub(crate) ticks: u64,
 }
 
@@ -79,6 +81,7 @@ impl Snapshot {
             events: Arc::default(),
             lease: None,
             counters: Arc::default(),
+            figures: Arc::default(),
             ticks: 0,
         }
     }

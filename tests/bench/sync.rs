@@ -266,8 +266,8 @@ impl Run {
             "p99_us": rank(0.99),
             "max_us": rank(1.0),
             "earliest_us": earliest,
-            "skipped": self.statistics.map_or(0, |it| it.skipped),
-            "real_time": self.statistics.map(|it| it.scheduling == Scheduling::RealTime),
+            "skipped": self.statistics.as_ref().map_or(0, |it| it.skipped),
+            "real_time": self.statistics.as_ref().map(|it| it.scheduling == Scheduling::RealTime),
         })
     }
 

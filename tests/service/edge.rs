@@ -244,6 +244,21 @@ fn what_there_is_is_described_and_counted() {
             text.contains("truestage_axis_homed{axis=\"x\"} 0\n"),
             "{text}"
         );
+        for figure in ["load_ratio", "frames_total", "errors_total"] {
+            let line = format!("\ntruestage_bus_{figure}{{bus=\"can0\"}} ");
+            assert!(text.contains(&line), "{text}");
+        }
+        let frames = text
+            .lines()
+            .find_map(|it| it.strip_prefix("truestage_bus_frames_total{bus=\"can0\"} "));
+        assert!(
+            frames.is_some_and(|it| it.parse::<u64>().unwrap() > 10),
+            "{text}"
+        );
+        assert!(
+            !text.contains("sync_lateness"),
+            "no thread sends SYNCs in simulated time: {text}"
+        );
     });
 }
 

@@ -69,12 +69,6 @@ impl Live {
         &self.clock
     }
 
-    /// What the SYNC thread of `port` has done, `None` when it has none.
-    pub fn sync_statistics(&self, port: Port) -> Option<SyncStatistics> {
-        let slot = self.slot(port)?;
-        slot.sync.as_ref().map(SyncThread::statistics)
-    }
-
     /// Counters of `port` for a person who looks for trouble; empty for an unknown port.
     pub fn counters(&self, port: Port) -> Vec<(&'static str, u64)> {
         self.slot(port)
@@ -152,6 +146,11 @@ impl Live {
 }
 
 impl Transport for Live {
+    fn sync_statistics(&self, port: Port) -> Option<SyncStatistics> {
+        let slot = self.slot(port)?;
+        slot.sync.as_ref().map(SyncThread::statistics)
+    }
+
     fn now(&self) -> Time {
         let now = self.clock.now().max(self.known.get());
         self.known.set(now);

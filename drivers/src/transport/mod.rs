@@ -4,10 +4,12 @@
 //! same: live ports (SocketCAN, SLCAN, serial lines), an in-process world in virtual time,
 //! and the replay of a recording.
 
+mod histogram;
 pub mod in_process;
 pub mod record;
 pub mod replay;
 mod sync_grid;
+mod sync_statistics;
 
 #[cfg(feature = "live")]
 pub mod awake;
@@ -41,6 +43,9 @@ pub mod sync_thread;
 use core::time::Duration;
 use units::Time;
 use wire::{Arrival, LinkState, Payload, Port, Ports};
+
+pub use histogram::Histogram;
+pub use sync_statistics::{Scheduling, SyncStatistics};
 
 /// Why something could not be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -109,4 +114,10 @@ pub trait Transport {
     /// # Errors
     /// When the port is no CAN bus or its SYNC thread cannot be started.
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError>;
+
+    /// What the SYNC producer of a CAN port has done; `None` when it has none, or none that can be late.
+    fn sync_statistics(&self, port: Port) -> Option<SyncStatistics> {
+        let _ = port;
+        None
+    }
 }

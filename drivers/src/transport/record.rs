@@ -27,7 +27,7 @@ use wire::LineControl;
 use wire::candump::{Content, Direction, Record};
 use wire::{Arrival, Input, LinkState, Payload, Port, Ports};
 
-use super::{SendError, Transport};
+use super::{SendError, SyncStatistics, Transport};
 
 /// The first line of a recording.
 pub(super) const HEADER: &str = "# truestage recording 1";
@@ -207,6 +207,10 @@ impl<T: Transport, W: io::Write> Transport for Recorder<T, W> {
 
     fn sleep_until(&mut self, until: Time) {
         self.inner.sleep_until(rounded(until));
+    }
+
+    fn sync_statistics(&self, port: Port) -> Option<SyncStatistics> {
+        self.inner.sync_statistics(port)
     }
 
     fn set_sync(&mut self, port: Port, period: Option<Duration>) -> Result<(), SendError> {

@@ -13,13 +13,12 @@ use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::os;
+pub use super::sync_statistics::{Scheduling, SyncStatistics};
 
 /// Below the kernel's own threads (50), above everything ordinary.
 const FIFO_PRIORITY: i32 = 40;
 /// Longer sleeps are cut into these, so that a thread told to stop does.
 const SLEEP_MAX: Duration = Duration::from_millis(50);
-/// How many classes [`SyncStatistics::histogram`] has.
-pub const LATENESS_CLASSES: usize = 16;
 
 /// Where SYNCs go; shared with the port that reads.
 pub trait SyncSink: Send + Sync {
@@ -28,22 +27,6 @@ pub trait SyncSink: Send + Sync {
     /// # Errors
     /// What the operating system said.
     fn send_sync(&self) -> Result<(), Errno>;
-}
-
-/// How the SYNC thread is scheduled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scheduling {
-    /// Not known yet.
-    #[default]
-    Starting,
-    /// SCHED_FIFO.
-    RealTime,
-    /// SCHED_FIFO was refused with this error number; allow it with `ulimit -r` or
-    /// CAP_SYS_NICE.
-    Ordinary {
-        /// The operating system's error number.
-        errno: i32,
-    },
 }
 
 impl Scheduling {
@@ -55,32 +38,6 @@ impl Scheduling {
                 errno: errno as i32,
             },
         }
-    }
-}
-
-/// What the SYNC thread has done so far; lateness is in wall time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SyncStatistics {
-    /// SYNCs sent.
-    pub sent: u64,
-    /// Periods left out because they were more than half a period late.
-    pub skipped: u64,
-    /// SYNCs that the port refused (queue full, interface down).
-    pub refused: u64,
-    /// The greatest lateness, of those left out too.
-    pub latest: Duration,
-    /// Class 0: less than 1 µs late; class n: less than 2^n µs; the last: anything more.
-    pub histogram: [u64; LATENESS_CLASSES],
-    /// How the thread is scheduled.
-    pub scheduling: Scheduling,
-}
-
-impl SyncStatistics {
-    fn note_lateness(&mut self, late: Duration) {
-        self.latest = self.latest.max(late);
-        let micros = late.as_micros().min(u128::from(u32::MAX)) as u32;
-        let class = (u32::BITS - micros.leading_zeros()) as usize;
-        self.histogram[class.min(LATENESS_CLASSES - 1)] += 1;
     }
 }
 
@@ -137,7 +94,7 @@ impl SyncThread {
 
     /// What it has done so far.
     pub fn statistics(&self) -> SyncStatistics {
-        self.shared.plan().statistics
+        self.shared.plan().statistics.clone()
     }
 }
 
@@ -170,7 +127,7 @@ impl Shared {
     fn act(&self, plan: &mut Plan, deadline: Duration, now: Duration) -> Duration {
         let late = now.saturating_sub(deadline);
         let period = plan.period;
-        plan.statistics.note_lateness(late);
+        plan.statistics.lateness.note(late);
         if late * 2 <= period {
             match self.sink.send_sync() {
                 Ok(()) => plan.statistics.sent += 1,
@@ -255,8 +212,8 @@ mod tests {
         let next = shared.act(&mut plan, 10 * MS, 10 * MS + late);
         assert_eq!(next, 12 * MS);
         assert_eq!(sent.try_iter().count(), 1);
-        assert_eq!(plan.statistics.latest, late);
-        assert_eq!(plan.statistics.histogram[9], 1);
+        assert_eq!(plan.statistics.lateness.greatest(), late);
+        assert_eq!(plan.statistics.lateness.total(), 1);
     }
 
     #[test]

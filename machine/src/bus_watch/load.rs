@@ -5,6 +5,8 @@ use core::time::Duration;
 use units::Time;
 use wire::can::{CanFrame, CanId};
 
+use crate::bus_account::bits;
+
 /// The number of 11-bit identifiers.
 const STANDARD: usize = 0x800;
 /// So many 29-bit identifiers are told apart in one window: CANopen uses none, and one that fills
@@ -44,13 +46,7 @@ impl Load {
     /// Counts `frame`, which arrived at `at` and is looked at now.
     pub(super) fn count(&mut self, at: Time, now: Time, frame: &CanFrame) {
         self.reach(at, now);
-        // Between the shortest form and the longest, with every stuff bit there may be.
-        let overhead = match frame.id() {
-            CanId::Standard(_) => 47,
-            CanId::Extended(_) => 67,
-        };
-        let bits = overhead + 8 * frame.data().len() as u32;
-        self.now.add(frame.id(), self.bit * bits);
+        self.now.add(frame.id(), self.bit * bits(frame));
     }
 
     /// Counts `frames` that came and that this computer did not take.

@@ -6,7 +6,7 @@
 //! - `hear` collects what was heard of one SYNC. `seats` knows which devices these are, `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
 //!   send. It runs in the thread that calls it (docs/decisions/0014).
 //! - `path` and `csv` write paths, `motion` plans moves and stops, `correction` limits what is
-//!   added, `histogram` counts times.
+//!   added.
 //!
 //! Two ways to stop. Trouble with the path or the host: a controlled stop, time-optimal within
 //! jerk, acceleration and speed, begun by all axes in the same period ([`Cause`]). Trouble with
@@ -25,7 +25,6 @@ mod decide;
 mod decide_tests;
 mod failure;
 mod hear;
-mod histogram;
 mod judge;
 mod lack;
 mod limits;
@@ -50,8 +49,8 @@ pub use correction::{
     THERMOMETERS_MAX, ThermometerSample, Validity,
 };
 pub use csv::{CsvError, CsvFault, CsvPath, Departure, read_path};
+pub use drivers::transport::Histogram;
 pub use failure::EngineFailure;
-pub use histogram::Histogram;
 pub use judge::{PathError, PathFault};
 pub use lack::{Lack, Source};
 pub use limits::{AxisLimits, CorrectionLimits};

@@ -334,8 +334,12 @@ impl Run<'_> {
 
     fn send_syncs(&mut self) -> Result<(), SendError> {
         let sync = Payload::Frame(emit_sync(None));
+        let machine = &mut *self.machine;
         let mut buses = self.seats.buses.iter();
-        buses.try_for_each(|port| self.machine.transport.send(*port, &sync))
+        buses.try_for_each(|port| {
+            machine.bus_account.sent(*port, &sync);
+            machine.transport.send(*port, &sync)
+        })
     }
 
     /// Takes what arrives until every axis has answered, or the time for it is over.
@@ -376,6 +380,7 @@ impl Run<'_> {
             return Err(Failure::Device { device, source });
         }
         while let Some(payload) = unit.device.poll_transmit() {
+            self.machine.bus_account.sent(unit.port, &payload);
             if let Err(source) = self.machine.transport.send(unit.port, &payload) {
                 let name = unit.name.clone();
                 return Err(self.not_sent(source, &name));

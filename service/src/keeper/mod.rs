@@ -21,6 +21,7 @@ use serde_json::json;
 use triple_buffer::Input;
 use truestage::linear::Teller;
 
+use crate::figures::Book;
 use crate::order::{Answered, Choice, Letter, Reply};
 use crate::snapshot::Snapshot;
 use crate::view::Cause;
@@ -109,6 +110,7 @@ pub(crate) struct Keeper {
     answers: Vec<(Reply, Answered)>,
     output: Input<Snapshot>,
     ticks: u64,
+    figures: Book,
     /// Who says what motions gave.
     teller: Option<Teller>,
 }
@@ -134,6 +136,7 @@ impl Keeper {
             answers: Vec::new(),
             output,
             ticks: 0,
+            figures: Book::default(),
             teller,
         }
     }

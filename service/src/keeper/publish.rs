@@ -31,6 +31,7 @@ impl Keeper {
         let motions = self.motions.list(&self.seats);
         let runs = self.runs.list(&self.seats);
         let events = self.events.list();
+        let figures = self.figures.look(machine);
         // What is there is of some earlier tick: everything is written over.
         let snapshot = self.output.input_buffer_mut();
         snapshot.now = now;
@@ -46,6 +47,7 @@ impl Keeper {
         if self.ticks % COUNTERS_EVERY == 1 || snapshot.counters.is_empty() {
             snapshot.counters = Arc::new(machine.devices().counters());
         }
+        snapshot.figures = figures;
         snapshot.ticks = self.ticks;
         self.output.publish();
     }

@@ -17,7 +17,7 @@ const CLASSES: usize = (STEPS * (DOUBLINGS + 1)) as usize;
 /// # Example
 ///
 /// ```
-/// use machine::engine::Histogram;
+/// use drivers::transport::Histogram;
 /// use std::time::Duration;
 ///
 /// let mut histogram = Histogram::default();
@@ -79,6 +79,20 @@ impl Histogram {
         }
         self.total += other.total;
         self.greatest = self.greatest.max(other.greatest);
+    }
+
+    /// What was noted since `earlier`, an older state of the same one. Its greatest time is known to its class only.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        let mut since = self.clone();
+        for (count, before) in since.counts.iter_mut().zip(&earlier.counts) {
+            *count = count.saturating_sub(*before);
+        }
+        since.total = self.total.saturating_sub(earlier.total);
+        let last = since.counts.iter().rposition(|it| *it > 0);
+        let greatest = last.map_or(Duration::ZERO, |it| Duration::from_micros(end(it)));
+        since.greatest = greatest.min(self.greatest);
+        since
     }
 
     /// How many were noted.
@@ -159,5 +173,27 @@ mod tests {
         assert_eq!((sum.total(), sum.greatest()), (102, histogram.greatest()));
         assert_eq!(sum.percentile(0.07), Duration::from_micros(8));
         assert!(histogram.to_string().starts_with("p50 52 us, p99 "));
+    }
+
+    #[test]
+    fn what_was_noted_since_is_as_if_nothing_had_been_before() {
+        let (mut all, mut late) = (Histogram::default(), Histogram::default());
+        all.note(Duration::from_secs(1));
+        let earlier = all.clone();
+        for micros in [3, 50, 50, 700] {
+            all.note(Duration::from_micros(micros));
+            late.note(Duration::from_micros(micros));
+        }
+        let since = all.since(&earlier);
+        assert_eq!(since.total(), 4);
+        for share in [0.25, 0.75] {
+            assert_eq!(since.percentile(share), late.percentile(share));
+        }
+        assert_eq!(
+            since.greatest(),
+            Duration::from_micros(704),
+            "the end of its class"
+        );
+        assert_eq!(all.since(&all), Histogram::default());
     }
 }
