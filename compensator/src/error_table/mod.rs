@@ -19,10 +19,12 @@
 //!
 //! Absent: periodic terms over a screw lead (system S1), storage, the machine's identity.
 
+mod comp_file;
 mod compensation;
 mod curve;
 mod datum_slip;
 mod fit;
+mod listed;
 mod outliers;
 mod robust;
 mod series;
@@ -35,9 +37,11 @@ use units::{Approach, Metres};
 pub use crate::interpolation::Interpolation;
 pub(crate) use curve::Curve;
 
+pub use comp_file::{CompFileType, ROWS_MAX, comp_file};
 pub use compensation::{Compensation, CompensationError, EndPolicy, LimitName, Limits, OutOfRange};
 pub use datum_slip::{Shifts, slip_at_start};
 pub use fit::{Drift, FitError, FitOptions, Fitted, NodeScatter, Repeats, RunDrift, analyse, fit};
+pub use listed::TableFault;
 pub use robust::{MeasuredPoint, Robust};
 pub use series::{LinearFault, LinearSeries, Measurement, SeriesError};
 pub use slip::{Change, SLIP_FALSE_ALARMS, Slip, find_slip};
