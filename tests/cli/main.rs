@@ -3,6 +3,7 @@
 mod align;
 mod alone;
 mod calibrations;
+mod controls;
 mod demo;
 mod example;
 mod examples;

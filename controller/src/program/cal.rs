@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 
 use crate::config::Loaded;
 use crate::program::belongs::head_of;
+use crate::program::controls::export::{self, ExportArgs};
+use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
@@ -52,6 +54,10 @@ pub(crate) enum CalCommand {
         #[arg(long)]
         axis: String,
     },
+    /// Write a calibration in the form of another control (LinuxCNC, SINUMERIK, PMAC), or as CSV.
+    Export(ExportArgs),
+    /// Store a table of another control, or of CSV, as a calibration of a linear axis.
+    Import(ImportArgs),
 }
 
 pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
@@ -65,6 +71,8 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
         } => diff(&opened(config)?, before, after, output),
         CalCommand::Activate { config, id } => activate(config, id, output),
         CalCommand::Rollback { config, axis } => rollback(config, axis, output),
+        CalCommand::Export(args) => export::run(args, output),
+        CalCommand::Import(args) => import::run(args, put_into_use, output),
     }
 }
 
@@ -170,8 +178,14 @@ pub(crate) fn compared(
     Ok((lines.join("\n"), json!({"changes": values})))
 }
 
-/// The stage and the configuration are checked here; the drive itself when it is used.
 fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
+    let (axis, id) = put_into_use(path, id)?;
+    let text = format!("axis {axis}: {} is in use", short(&id));
+    output.result(&text, &json!({"axis": axis, "active": id}))
+}
+
+/// The axis and the whole name. The stage and the configuration are checked here; the drive itself when it is used.
+fn put_into_use(path: &std::path::Path, id: &str) -> Result<(String, String), Failure> {
     let loaded = config::load(path)?;
     let store = loaded.config.machine.store();
     // Whoever measures with a calibration must find it there to the end.
@@ -180,8 +194,7 @@ fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
     let head = head_of(&loaded, &store, &id)?;
     known_axis(&loaded, &head.axis)?;
     store.activate(&head.axis, &id)?;
-    let text = format!("axis {}: {} is in use", head.axis, short(&id));
-    output.result(&text, &json!({"axis": head.axis, "active": id}))
+    Ok((head.axis, id))
 }
 
 fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {

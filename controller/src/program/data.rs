@@ -273,7 +273,11 @@ fn store_fit(
 }
 
 /// The linear axis that a table is stored for.
-fn linear_axis(path: &Path, config: &MachineConfig, axis: Option<&str>) -> Result<String, Failure> {
+pub(super) fn linear_axis(
+    path: &Path,
+    config: &MachineConfig,
+    axis: Option<&str>,
+) -> Result<String, Failure> {
     let names: Vec<&str> = config.axis.keys().map(String::as_str).collect();
     let usage = |what, help| Err(Failure::Usage { what, help });
     match (axis, names.as_slice()) {

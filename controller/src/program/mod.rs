@@ -6,6 +6,7 @@ mod before;
 mod belongs;
 mod cal;
 mod check;
+mod controls;
 mod data;
 mod data_file;
 mod demo;
