@@ -1,10 +1,12 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
 //! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
+//! lxml, which judges certificates by the schema of the PTB;
 //! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its page.
 
 mod analog;
 mod budget;
 mod csp;
+mod dcc;
 mod drive;
 mod emulated;
 mod http;

@@ -10,9 +10,10 @@ use machine::records::{CalibrationRecord, RecordHead, Store};
 use serde_json::{Map, Value, json};
 
 use super::correction::{Correction, Side};
+use super::dcc::Issuer;
 use super::exported::{Exported, Written};
 use super::format::FormatName;
-use super::{csv, linuxcnc, pmac, sinumerik};
+use super::{csv, dcc, linuxcnc, pmac, sinumerik};
 use crate::config::{self, Loaded};
 use crate::linear::LinearContent;
 use crate::program::belongs::head_of;
@@ -24,7 +25,8 @@ use crate::{Failure, linear};
 const EXAMPLES: &str = "Examples:\n  truestage cal export machine.toml 3f2a --format csv --out x.csv\n  \
     truestage cal export machine.toml 3f2a --format linuxcnc --name 0 --out x.comp\n  \
     truestage cal export machine.toml 3f2a --format sinumerik-eec --name X1 --approach mean\n  \
-    truestage cal export machine.toml 3f2a --format pmac --name 3 --counts 10000\n\n\
+    truestage cal export machine.toml 3f2a --format pmac --name 3 --counts 10000\n  \
+    truestage cal export machine.toml 3f2a --format dcc --laboratory \"Works 2\" --country DE --person \"A. Meier\"\n\n\
     docs/exchange.md says how each control uses its table, with its sign.";
 
 /// Which calibration, for whom.
@@ -56,6 +58,15 @@ pub(crate) struct ExportArgs {
     /// encoder that the calibration was made with.
     #[arg(long, value_name = "COUNTS")]
     counts: Option<f64>,
+    /// DCC: who issues the certificate.
+    #[arg(long, value_name = "NAME")]
+    laboratory: Option<String>,
+    /// DCC: where, by ISO 3166-1 (DE).
+    #[arg(long, value_name = "CODE")]
+    country: Option<String>,
+    /// DCC: who answers for it.
+    #[arg(long, value_name = "NAME")]
+    person: Option<String>,
 }
 
 pub(crate) fn run(args: &ExportArgs, output: Output) -> Ended {
@@ -108,6 +119,9 @@ fn written(
     store: &Store,
     id: &str,
 ) -> Result<Written, Failure> {
+    if args.format == FormatName::Dcc {
+        return certificate(args, store, id);
+    }
     // What is in another control's table must be of this very machine.
     let head = head_of(loaded, store, id)?;
     let kind = store.glance(id)?.kind;
@@ -138,6 +152,21 @@ fn written(
         FormatName::SinumerikEec => sinumerik::written(&exported),
         _ => in_columns(&exported),
     }
+}
+
+/// Of the record as it is, whatever the configuration has become since.
+fn certificate(args: &ExportArgs, store: &Store, id: &str) -> Result<Written, Failure> {
+    let glance = store.glance(id)?;
+    if glance.kind != LinearContent::KIND {
+        return Err(not_of_one_axis(args.format, &glance.head, glance.kind));
+    }
+    let CalibrationRecord { head, content } = store.load::<LinearContent>(id)?;
+    let issuer = Issuer {
+        laboratory: args.laboratory.as_deref(),
+        country: args.country.as_deref(),
+        person: args.person.as_deref(),
+    };
+    dcc::written(id, &head, &content, &issuer)
 }
 
 /// The record itself; nothing is chosen or interpolated.

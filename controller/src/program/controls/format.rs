@@ -9,6 +9,8 @@ use crate::Failure;
 pub(super) enum FormatName {
     /// Deviations and uncertainties in columns, for people and programs; `cal import` reads it.
     Csv,
+    /// Digital Calibration Certificate (PTB, schema 3.3.0) of a linear axis: in-house, not accredited, not signed.
+    Dcc,
     /// LinuxCNC: COMP_FILE with COMP_FILE_TYPE = 1.
     Linuxcnc,
     /// Turbo PMAC: DEFINE COMP and DEFINE BLCOMP.
@@ -32,6 +34,7 @@ impl FormatName {
     pub(super) const fn in_words(self) -> &'static str {
         match self {
             Self::Csv => "CSV",
+            Self::Dcc => "DCC",
             Self::Linuxcnc => "LinuxCNC",
             Self::Pmac => "Turbo PMAC",
             Self::SinumerikEec => "SINUMERIK $AA_ENC_COMP",
@@ -77,7 +80,7 @@ impl FormatName {
              value moves the axis",
         );
         match self {
-            Self::Csv | Self::Linuxcnc | Self::Pmac | Self::SinumerikEec => None,
+            Self::Csv | Self::Dcc | Self::Linuxcnc | Self::Pmac | Self::SinumerikEec => None,
             Self::Aerotech | Self::Aerotech2d => Some(AEROTECH),
             Self::Acs => Some((
                 "public programs show how ERRORMAP1D is called: axis, zone, base, step, array",
@@ -116,6 +119,6 @@ mod tests {
             assert!(expected.iter().all(|it| said.contains(*it)), "{said}");
         }
         let settled = FormatName::value_variants().iter();
-        assert_eq!(settled.filter(|it| it.require_settled().is_ok()).count(), 4);
+        assert_eq!(settled.filter(|it| it.require_settled().is_ok()).count(), 5);
     }
 }

@@ -1,0 +1,283 @@
+//! A Digital Calibration Certificate (DCC) of a linear axis.
+//!
+//! Source: Physikalisch-Technische Bundesanstalt, DCC schema 3.3.0 (`https://ptb.de/dcc`), and D-SI 2.2.1
+//! (`https://ptb.de/si`) for values with units and standard uncertainties.
+//!
+//! It says what the record says, and that nobody has accredited whoever issues it. Who that is, the record does not
+//! know: it is asked for. Absent: a signature; the certificates of the instruments.
+
+use machine::records::RecordHead;
+use serde_json::Map;
+use units::Approach;
+
+use super::exported::Written;
+use crate::Failure;
+use crate::linear::LinearContent;
+use crate::linear::record::NodeRecord;
+
+/// Who issues it.
+pub(super) struct Issuer<'a> {
+    pub(super) laboratory: Option<&'a str>,
+    /// ISO 3166-1.
+    pub(super) country: Option<&'a str>,
+    pub(super) person: Option<&'a str>,
+}
+
+pub(super) fn written(
+    id: &str,
+    head: &RecordHead,
+    content: &LinearContent,
+    issuer: &Issuer<'_>,
+) -> Result<Written, Failure> {
+    let laboratory = given("--laboratory", issuer.laboratory)?;
+    let person = given("--person", issuer.person)?;
+    let country = country(given("--country", issuer.country)?)?;
+    let sides = content.approaches();
+    let u = |it: &NodeRecord| (sides.iter()).all(|side| uncertainty(it, *side).is_some());
+    if !content.nodes.iter().all(u) {
+        return Err(Failure::Usage {
+            what: "--format dcc: a certificate states the uncertainty of every value, and this calibration does not".into(),
+            help: "calibrate again with two runs at least, or import the table with --uncertainty-um".into(),
+        });
+    }
+    let contact = format!(
+        "{}<dcc:location><dcc:countryCode>{country}</dcc:countryCode></dcc:location>",
+        name(laboratory)
+    );
+    let results: String = sides.iter().map(|it| result(content, *it)).collect();
+    let text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<dcc:digitalCalibrationCertificate xmlns:dcc=\"https://ptb.de/dcc\" \
+         xmlns:si=\"https://ptb.de/si\" schemaVersion=\"3.3.0\">\n<dcc:administrativeData>\n{}{}{}\
+         <dcc:calibrationLaboratory><dcc:contact>{contact}</dcc:contact></dcc:calibrationLaboratory>\n\
+         <dcc:respPersons><dcc:respPerson><dcc:person>{}</dcc:person><dcc:mainSigner>true</dcc:mainSigner>\
+         </dcc:respPerson></dcc:respPersons>\n<dcc:customer>{contact}</dcc:customer>\n{}</dcc:administrativeData>\n\
+         <dcc:measurementResults>\n{}{}<dcc:measurementResult>{}<dcc:results>\n{results}</dcc:results>\
+         </dcc:measurementResult>\n</dcc:measurementResults>\n</dcc:digitalCalibrationCertificate>\n",
+        software(),
+        core(id, head, country),
+        item(head),
+        name(person),
+        statement(),
+        equipment(head),
+        conditions(head),
+        name(&format!("Positioning deviations of axis {}", head.axis)),
+    );
+    Ok(Written {
+        text,
+        told: vec![
+            "in-house, not accredited, not signed: the certificate says so; whoever signs it answers for it".into(),
+            "its dates are the day on which the calibration was stored".into(),
+        ],
+        figures: Map::new(),
+    })
+}
+
+fn given<'a>(option: &str, value: Option<&'a str>) -> Result<&'a str, Failure> {
+    let value = value.map(str::trim).filter(|it| !it.is_empty());
+    value.ok_or_else(|| Failure::Usage {
+        what: format!("--format dcc: a certificate names who issues it, and {option} does not say"),
+        help: "add --laboratory NAME --country DE --person NAME".into(),
+    })
+}
+
+fn country(text: &str) -> Result<&str, Failure> {
+    match text.len() == 2 && text.bytes().all(|it| it.is_ascii_uppercase()) {
+        true => Ok(text),
+        false => Err(Failure::Usage {
+            what: format!("--country {text}: it is two capital letters (ISO 3166-1)"),
+            help: "write DE for Germany".into(),
+        }),
+    }
+}
+
+/// Text as XML holds it; what XML cannot hold at all is left out.
+fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    for it in text.chars() {
+        match it {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '\t' | '\n' | '\r' => out.push(' '),
+            it if it.is_control() || matches!(it, '\u{fffe}' | '\u{ffff}') => {}
+            it => out.push(it),
+        }
+    }
+    out
+}
+
+fn content(text: &str) -> String {
+    format!("<dcc:content lang=\"en\">{}</dcc:content>", escaped(text))
+}
+
+fn name(text: &str) -> String {
+    format!("<dcc:name>{}</dcc:name>", content(text))
+}
+
+fn software() -> String {
+    format!(
+        "<dcc:dccSoftware><dcc:software>{}<dcc:release>{}</dcc:release></dcc:software></dcc:dccSoftware>\n",
+        name("truestage"),
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+fn core(id: &str, head: &RecordHead, country: &str) -> String {
+    // RFC 3339 begins with the day.
+    let day = head.created.get(..10).unwrap_or(&head.created);
+    format!(
+        "<dcc:coreData><dcc:countryCodeISO3166_1>{country}</dcc:countryCodeISO3166_1>\
+         <dcc:usedLangCodeISO639_1>en</dcc:usedLangCodeISO639_1>\
+         <dcc:mandatoryLangCodeISO639_1>en</dcc:mandatoryLangCodeISO639_1>\
+         <dcc:uniqueIdentifier>truestage {id}</dcc:uniqueIdentifier>\
+         <dcc:beginPerformanceDate>{day}</dcc:beginPerformanceDate>\
+         <dcc:endPerformanceDate>{day}</dcc:endPerformanceDate>\
+         <dcc:performanceLocation>other</dcc:performanceLocation></dcc:coreData>\n"
+    )
+}
+
+fn item(head: &RecordHead) -> String {
+    let identification = |value: &str, what: &str| {
+        let value = if value.is_empty() { "unknown" } else { value };
+        format!(
+            "<dcc:identification><dcc:issuer>owner</dcc:issuer><dcc:value>{}</dcc:value>{}</dcc:identification>",
+            escaped(value),
+            name(what)
+        )
+    };
+    format!(
+        "<dcc:items><dcc:item>{}<dcc:identifications>{}{}{}</dcc:identifications></dcc:item></dcc:items>\n",
+        name(&format!("Axis {} of machine {}", head.axis, head.machine)),
+        identification(&head.stage_serial, "serial number of the stage"),
+        identification(
+            &head.drive.serial.to_string(),
+            "serial number of the drive, 0 where unknown"
+        ),
+        identification(&head.config_hash, "hash of the configuration")
+    )
+}
+
+fn statement() -> String {
+    format!(
+        "<dcc:statements><dcc:statement>{}<dcc:declaration>{}</dcc:declaration></dcc:statement></dcc:statements>\n",
+        name("In-house calibration, not accredited"),
+        content(
+            "This certificate was made by a program from a stored calibration. No accreditation body has assessed who \
+             issues it. It is not signed. The certificates of the instruments are not part of it."
+        )
+    )
+}
+
+fn equipment(head: &RecordHead) -> String {
+    let instrument = &head.instrument;
+    let is_corrected = [
+        ("air", instrument.air_corrected),
+        ("material temperature", instrument.material_corrected),
+        ("dead path", instrument.dead_path_corrected),
+        ("cosine", instrument.cosine_corrected),
+    ];
+    let corrected: Vec<&str> = is_corrected
+        .iter()
+        .filter(|it| it.1)
+        .map(|it| it.0)
+        .collect();
+    let corrected = match corrected.as_slice() {
+        [] => "nothing".to_owned(),
+        all => all.join(", "),
+    };
+    let lacks = instrument
+        .warning()
+        .map_or(String::new(), |it| format!("; {it}"));
+    let what = format!(
+        "{} {}; corrected for: {corrected}{lacks}; source: {}",
+        instrument.name, instrument.identity, head.source
+    );
+    format!(
+        "<dcc:measuringEquipments><dcc:measuringEquipment>{}<dcc:description>{}</dcc:description></dcc:measuringEquipment>\
+         </dcc:measuringEquipments>\n",
+        name(&instrument.name),
+        content(&what)
+    )
+}
+
+fn conditions(head: &RecordHead) -> String {
+    let environment = &head.environment;
+    let known = [
+        (
+            "air temperature",
+            environment.air_temperature_c,
+            "\\degreecelsius",
+        ),
+        (
+            "material temperature",
+            environment.material_temperature_c,
+            "\\degreecelsius",
+        ),
+        ("air pressure", environment.pressure_pa, "\\pascal"),
+        ("relative humidity", environment.relative_humidity, "\\one"),
+    ];
+    let each = known.iter().filter_map(|(what, value, unit)| {
+        let value = (*value)?;
+        Some(format!(
+            "<dcc:influenceCondition>{}<dcc:data><dcc:quantity><si:real><si:value>{value}</si:value>\
+             <si:unit>{unit}</si:unit></si:real></dcc:quantity></dcc:data></dcc:influenceCondition>",
+            name(&format!("{what}, mean over the run"))
+        ))
+    });
+    match each.collect::<String>() {
+        none if none.is_empty() => none,
+        each => format!("<dcc:influenceConditions>{each}</dcc:influenceConditions>\n"),
+    }
+}
+
+fn uncertainty(node: &NodeRecord, side: Approach) -> Option<f64> {
+    match side {
+        Approach::Forward => node.forward_u_m,
+        Approach::Reverse => node.reverse_u_m,
+    }
+}
+
+fn deviation(node: &NodeRecord, side: Approach) -> Option<f64> {
+    match side {
+        Approach::Forward => node.forward_m,
+        Approach::Reverse => node.reverse_m,
+    }
+}
+
+fn result(content: &LinearContent, side: Approach) -> String {
+    let list = |of: &dyn Fn(&NodeRecord) -> Option<f64>| -> String {
+        let all: Vec<String> = content
+            .nodes
+            .iter()
+            .filter_map(of)
+            .map(|it| it.to_string())
+            .collect();
+        all.join(" ")
+    };
+    let quantity = |what: &str, values: String, u: &str| {
+        format!(
+            "<dcc:quantity>{}<si:realListXMLList><si:valueXMLList>{values}</si:valueXMLList>\
+             <si:unitXMLList>\\metre</si:unitXMLList>{u}</si:realListXMLList></dcc:quantity>\n",
+            name(what)
+        )
+    };
+    let u = format!(
+        "<si:measurementUncertaintyUnivariateXMLList><si:standardMUXMLList><si:valueStandardMUXMLList>{}\
+         </si:valueStandardMUXMLList></si:standardMUXMLList></si:measurementUncertaintyUnivariateXMLList>",
+        list(&|it| uncertainty(it, side))
+    );
+    let approach = match side {
+        Approach::Forward => "forward approach (growing coordinates)",
+        Approach::Reverse => "reverse approach (falling coordinates)",
+    };
+    format!(
+        "<dcc:result>{}<dcc:data><dcc:list>\n{}{}</dcc:list></dcc:data></dcc:result>\n",
+        name(approach),
+        quantity("target position", list(&|it| Some(it.position_m)), ""),
+        quantity(
+            "deviation, actual - target",
+            list(&|it| deviation(it, side)),
+            &u
+        )
+    )
+}

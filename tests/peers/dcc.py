@@ -1,0 +1,57 @@
+"""Whether certificates are valid by the DCC schema, and what they say, read as D-SI defines it.
+
+In: the schema's path as argument, then a line with the path of a certificate for each. Out: for each one line of
+JSON: whether it is valid, why not, the unit and the numbers of each result, and its statements. The schema is that of the
+Physikalisch-Technische Bundesanstalt; lxml (libxml2) judges by it.
+"""
+
+import json
+import sys
+
+from lxml import etree
+
+DCC = "{https://ptb.de/dcc}"
+SI = "{https://ptb.de/si}"
+
+
+def texts(node, path):
+    return [" ".join(it.itertext()).strip() for it in node.iterfind(path)]
+
+
+def numbers(node, path):
+    return [float(it) for text in texts(node, path) for it in text.split()]
+
+
+def said(root):
+    results = []
+    for result in root.iter(DCC + "result"):
+        quantities = list(result.iter(DCC + "quantity"))
+        results.append(
+            {
+                "name": texts(result, DCC + "name")[0],
+                "units": texts(result, ".//" + SI + "unitXMLList"),
+                "positions": numbers(quantities[0], ".//" + SI + "valueXMLList"),
+                "deviations": numbers(quantities[1], ".//" + SI + "valueXMLList"),
+                "uncertainties": numbers(quantities[1], ".//" + SI + "valueStandardMUXMLList"),
+            }
+        )
+    return {"results": results, "statements": texts(root, ".//" + DCC + "statement")}
+
+
+def judged(schema, path):
+    try:
+        tree = etree.parse(path)
+    except etree.XMLSyntaxError as error:
+        return {"valid": False, "errors": [str(error)]}
+    valid = schema.validate(tree)
+    errors = [f"{it.line}: {it.message}" for it in schema.error_log]
+    return {"valid": valid, "errors": errors, **(said(tree.getroot()) if valid else {})}
+
+
+def main():
+    schema = etree.XMLSchema(etree.parse(sys.argv[1]))
+    for line in sys.stdin:
+        print(json.dumps(judged(schema, line.strip())), flush=True)
+
+
+main()
