@@ -53,6 +53,7 @@ mod edit;
 #[cfg(feature = "emulator")]
 pub mod emulated;
 mod failure;
+mod groups;
 mod handle;
 mod hardware;
 mod homing;
@@ -66,6 +67,7 @@ pub mod ports;
 mod program;
 pub mod rotary;
 mod run;
+pub mod runs;
 mod store;
 mod stores;
 pub mod volumetric;
@@ -74,6 +76,7 @@ pub mod volumetric;
 pub use agreed::Agreed;
 pub use connected::Machine;
 pub use failure::Failure;
+pub use groups::groups;
 pub use run::CalibrateOptions;
 
 // The command, whose `main` is this alone; who keeps a machine for others is given to it.

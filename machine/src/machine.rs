@@ -96,6 +96,8 @@ pub struct Machine {
     pub(crate) stop: StopRequest,
     /// Who looks after it at the end of every tick.
     pub(crate) attendant: Option<Box<dyn Attendant>>,
+    /// The cyclic loop has axes in its hands.
+    pub(crate) follows: bool,
     /// Whether its cyclic loops ask for SCHED_FIFO and locked memory.
     pub(crate) real_time: bool,
 }
@@ -140,6 +142,7 @@ impl Machine {
             notices: Notices::default(),
             stop: StopRequest::default(),
             attendant: None,
+            follows: false,
             real_time: false,
         }
     }

@@ -1,6 +1,6 @@
-//! Moves of a linear axis that nobody waits for: begun, asked for, halted.
+//! Moves of a linear axis that nobody waits for.
 
-use drivers::device::{AxisCommand, DriveCommand};
+use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond};
 
 use crate::failure::Failure;
@@ -8,7 +8,7 @@ use crate::machine::Machine;
 
 /// A linear axis of a machine, to be moved by whoever does not wait.
 ///
-/// Each of these begins something; [`Machine::outcome`] says how it ended.
+/// [`Machine::outcome`] says how a move ended; [`Driving`](crate::Driving) stops it.
 pub struct Moving<'m> {
     machine: &'m mut Machine,
     /// Its number among the linear axes.
@@ -32,53 +32,20 @@ impl<'m> Moving<'m> {
     pub fn begin(&mut self, set_point: Metres, speed: MetresPerSecond) -> Result<(), Failure> {
         let acceleration = self.machine.settings[self.at].acceleration;
         self.machine.require_supervised(self.at)?;
-        self.command(AxisCommand::MoveTo {
+        let now = self.machine.now();
+        let command = AxisCommand::MoveTo {
             target: set_point,
             speed,
             acceleration,
-        });
+        };
+        self.machine.devices.axes[self.at]
+            .device
+            .command(now, command);
         Ok(())
     }
 
     /// The move to `set_point` has ended there: from which side it came is remembered.
     pub fn arrived(&mut self, set_point: Metres) {
         self.machine.approach[self.at].update(set_point);
-    }
-
-    /// Slows down and stands, staying enabled; from which side it came there nobody knows.
-    pub fn halt(&mut self) {
-        self.give_up(DriveCommand::Halt);
-    }
-
-    /// Stops as fast as the quick stop deceleration allows, then disables.
-    pub fn quick_stop(&mut self) {
-        self.give_up(DriveCommand::QuickStop);
-    }
-
-    /// Begins to switch the axis on.
-    ///
-    /// # Errors
-    /// When the machine is not started.
-    pub fn enable(&mut self) -> Result<(), Failure> {
-        self.machine.require_supervised(self.at)?;
-        self.command(DriveCommand::Enable.into());
-        Ok(())
-    }
-
-    /// Begins to switch the axis off.
-    pub fn disable(&mut self) {
-        self.command(DriveCommand::Disable.into());
-    }
-
-    fn give_up(&mut self, command: DriveCommand) {
-        self.machine.approach[self.at].forget();
-        self.command(command.into());
-    }
-
-    fn command(&mut self, command: AxisCommand) {
-        let now = self.machine.now();
-        self.machine.devices.axes[self.at]
-            .device
-            .command(now, command);
     }
 }

@@ -9,6 +9,7 @@
 //! second form. Nothing here is a safety function: wire STO.
 
 mod access;
+mod coordinate;
 mod desk;
 mod figures;
 mod http;
@@ -17,7 +18,6 @@ mod ledger;
 mod manager;
 mod order;
 mod problem;
-mod procedures;
 mod quantity;
 mod request;
 mod scribe;
@@ -28,19 +28,21 @@ mod view;
 pub use access::{
     Access, AccessError, AccessFiles, Role, RoleError, SecretError, TlsError, TokenError, add_token,
 };
+pub use coordinate::Coordinate;
 pub use desk::Desk;
 pub use figures::{Figures, Minute};
 pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
 pub use manager::Manager;
 pub use problem::{Code, Problem, ProblemBody};
-pub use quantity::{Length, Quantity, Speed};
+pub use quantity::{Quantity, Speed};
 pub use request::{
-    Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, RunKind, RunRequest, StopMode, Target,
+    AnswerRequest, Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, RunKind, RunRequest,
+    StopMode, Target, WayName,
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{
     AxisState, AxisView, CalibrationView, Cause, Event, JournalView, LeaseView, Leased, LegView,
-    MachineState, MachineView, MotionState, MotionView, RunPlanView, RunState, RunView, Stopped,
-    ToldView,
+    MachineState, MachineView, MotionState, MotionView, QuestionView, RunPlanView, RunState,
+    RunView, Stopped, ToldView,
 };

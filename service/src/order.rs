@@ -3,7 +3,9 @@
 use tokio::sync::oneshot;
 
 use crate::problem::Problem;
-use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode};
+use crate::request::{
+    AnswerRequest, Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode,
+};
 use crate::view::Leased;
 
 /// What is asked of the machine's thread.
@@ -31,6 +33,8 @@ pub(crate) enum Order {
     Pause { run: String },
     /// A paused run goes on.
     Resume { run: String },
+    /// A person answers the question of a run.
+    Answer { run: String, answer: AnswerRequest },
     /// Who may command; the token is what the holder is given.
     Lease {
         request: LeaseRequest,
@@ -68,6 +72,7 @@ impl Order {
             | Self::Abort { .. }
             | Self::Pause { .. }
             | Self::Resume { .. }
+            | Self::Answer { .. }
             | Self::Calibration(_) => true,
         }
     }

@@ -44,6 +44,8 @@ pub enum Code {
     NotOffered,
     /// The run is in another state than the request needs.
     RunState,
+    /// The run does not ask that: it asks nothing now, or something else, or is not answered so.
+    NotAsked,
     /// Too many orders are waiting.
     Busy,
     /// Whoever asks has no token that is known.
@@ -111,6 +113,7 @@ impl Code {
             | Self::NotZeroed
             | Self::ErrorStop
             | Self::RunState
+            | Self::NotAsked
             | Self::Stopped
             | Self::ServiceRestarted => 409,
             Self::Device
@@ -139,6 +142,7 @@ impl Code {
             | Self::Leased
             | Self::Unauthorized
             | Self::Forbidden
+            | Self::NotAsked
             | Self::RunState => 3,
             Self::OutOfTolerance => 5,
             Self::Stopped => 130,

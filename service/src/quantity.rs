@@ -4,19 +4,21 @@ use core::fmt;
 
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use units::{Metres, MetresPerSecond, text};
+use units::{Metres, MetresPerSecond, Radians, text};
 use utoipa::ToSchema;
 
 mod form;
 
-pub(crate) use form::{LengthIn, SpeedIn, TravelSpeedIn, targets};
+pub(crate) use form::{PlaceIn, SpeedIn, TravelSpeedIn, targets};
+
+use crate::coordinate::Coordinate;
 
 /// A value and its unit, as it comes out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Quantity {
     /// How much.
     pub value: f64,
-    /// Of what: `mm`, `um`, `mm/s`.
+    /// Of what: `mm`, `um`, `deg`, `arcsec`, `mm/s`.
     pub unit: String,
 }
 
@@ -37,6 +39,22 @@ impl Quantity {
         }
     }
 
+    /// An angle, in degrees.
+    pub fn deg(angle: Radians) -> Self {
+        Self {
+            value: angle.degrees(),
+            unit: "deg".into(),
+        }
+    }
+
+    /// A small angle, in arcseconds.
+    pub fn arcsec(angle: Radians) -> Self {
+        Self {
+            value: angle.arcsec(),
+            unit: "arcsec".into(),
+        }
+    }
+
     /// The length that it is; `None` when it is none.
     pub fn length(&self) -> Option<Metres> {
         text::length(&self.text())
@@ -44,6 +62,24 @@ impl Quantity {
 
     fn text(&self) -> String {
         format!("{}{}", self.value, self.unit)
+    }
+}
+
+impl Coordinate {
+    /// As it is shown: in millimetres or degrees.
+    pub(crate) fn shown(self) -> Quantity {
+        match self {
+            Self::Length(it) => Quantity::mm(it),
+            Self::Angle(it) => Quantity::deg(it),
+        }
+    }
+
+    /// As something small is shown: in micrometres or arcseconds.
+    pub(crate) fn small(self) -> Quantity {
+        match self {
+            Self::Length(it) => Quantity::um(it),
+            Self::Angle(it) => Quantity::arcsec(it),
+        }
     }
 }
 
@@ -63,18 +99,17 @@ trait Written: Sized {
     fn from_text(text: &str) -> Option<Self>;
 }
 
-/// A length as it goes in: `"12.5mm"` or `{"value": 12.5, "unit": "mm"}`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Length(pub Metres);
-
-impl Written for Length {
-    const EXPECTED: &'static str = "a length with its unit (m, mm, um or nm): \"12.5mm\" or \
-                                    {\"value\": 12.5, \"unit\": \"mm\"}";
-    const UNITS: &'static [&'static str] = &["m", "mm", "um", "nm"];
+impl Written for Coordinate {
+    const EXPECTED: &'static str = "a length with its unit (m, mm, um or nm), or an angle of an axis that turns (deg, \
+                                    arcmin, arcsec, mrad or rad): \"12.5mm\" or {\"value\": 12.5, \"unit\": \"mm\"}";
+    const UNITS: &'static [&'static str] = &[
+        "m", "mm", "um", "nm", "deg", "arcmin", "arcsec", "mrad", "rad",
+    ];
     const TYPED: &'static [&'static str] = &["µm"];
 
     fn from_text(text: &str) -> Option<Self> {
-        text::length(text).map(Self)
+        let length = text::length(text).map(Self::Length);
+        length.or_else(|| text::angle(text).map(Self::Angle))
     }
 }
 
@@ -139,7 +174,14 @@ macro_rules! written {
     };
 }
 
-written!(Length, |it: &Length| Quantity::mm(it.0));
+written!(Coordinate, |it: &Coordinate| match it {
+    Coordinate::Length(it) => Quantity::mm(*it),
+    // Read again, it is the same to the last bit: the same request is one motion, also after a restart.
+    Coordinate::Angle(it) => Quantity {
+        value: it.value(),
+        unit: "rad".into(),
+    },
+});
 written!(Speed, |it: &Speed| Quantity {
     value: it.0.value() * 1e3,
     unit: "mm/s".into(),
@@ -151,10 +193,14 @@ mod tests {
 
     #[test]
     fn a_quantity_has_a_unit_or_is_refused_with_an_example() {
-        let read = |text: &str| serde_json::from_str::<Length>(text).map(|it| it.0.mm());
+        let read = |text: &str| {
+            let place = serde_json::from_str::<Coordinate>(text);
+            place.map(|it| it.shown().value)
+        };
         assert_eq!(read("\"12.5mm\"").unwrap(), 12.5);
         assert_eq!(read("\"250 µm\"").unwrap(), 0.25);
         assert_eq!(read(r#"{"value": 3, "unit": "mm"}"#).unwrap(), 3.0);
+        assert!((read("\"-30arcmin\"").unwrap() + 0.5).abs() < 1e-12);
         for text in [
             "12.5",
             "3",
@@ -162,7 +208,8 @@ mod tests {
             "\"nanmm\"",
             "\"1mm/s\"",
             "null",
-            r#"{"value": 3, "unit": "deg"}"#,
+            r#"{"value": 3, "unit": "turns"}"#,
+            "\"90 °\"",
             r#"{"value": 3}"#,
             r#"{"value": 3, "unit": "mm", "more": 1}"#,
             r#"{"value": 3, "unit": "0mm"}"#,
@@ -180,8 +227,13 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again() {
-        let text = serde_json::to_string(&Length(Metres::from_mm(-0.25))).unwrap();
-        assert_eq!(serde_json::from_str::<Length>(&text).unwrap().0.mm(), -0.25);
+        for place in [
+            Coordinate::Length(Metres::from_mm(-0.25)),
+            Coordinate::Angle(Radians::from_degrees(12.3)),
+        ] {
+            let text = serde_json::to_string(&place).unwrap();
+            assert_eq!(serde_json::from_str::<Coordinate>(&text).unwrap(), place);
+        }
         let speed: Speed = serde_json::from_str("\"20mm/s\"").unwrap();
         let text = serde_json::to_string(&speed).unwrap();
         assert_eq!(serde_json::from_str::<Speed>(&text).unwrap(), speed);

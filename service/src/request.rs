@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use machine::Stage;
 use serde::{Deserialize, Serialize};
+use truestage::rotary::Way;
 use utoipa::ToSchema;
 
 mod whole;
 
-use crate::quantity::{Length, Speed, SpeedIn, TravelSpeedIn};
+use crate::coordinate::Coordinate;
+use crate::quantity::{Speed, SpeedIn, TravelSpeedIn};
 
 /// Who asks, and by which right.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,7 +32,7 @@ impl Caller {
 }
 
 /// Where each axis goes.
-pub type Target = BTreeMap<String, Length>;
+pub type Target = BTreeMap<String, Coordinate>;
 
 /// A motion that is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -38,10 +41,13 @@ pub struct MoveRequest {
     /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time.
     #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
-    /// How fast each may be at most; the usual speed of its configuration when left out.
+    /// How fast each may be at most; the usual speed of its configuration when left out. For axes along a way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<TravelSpeedIn>)]
     pub speed: Option<Speed>,
+    /// Which way round an axis goes that turns; the shortest when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub way: Option<WayName>,
     /// What happens when one of the axes is in use.
     #[serde(default)]
     pub if_moving: IfMoving,
@@ -66,14 +72,40 @@ pub struct MoveRequest {
 
 impl MoveRequest {
     /// The motion of one axis, as it is refused, corrected and limited by default.
-    pub fn of(axis: &str, target: units::Metres) -> Self {
+    pub fn of(axis: &str, target: impl Into<Coordinate>) -> Self {
         Self {
-            targets: [(axis.to_owned(), Length(target))].into(),
+            targets: [(axis.to_owned(), target.into())].into(),
             speed: None,
+            way: None,
             if_moving: IfMoving::default(),
             uncompensated: false,
             beyond: false,
             dead_man_ms: None,
+        }
+    }
+}
+
+/// Which way round an axis goes that turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WayName {
+    /// Less than half a turn, whichever way that is.
+    Shortest,
+    /// With growing angles, less than a turn.
+    Forward,
+    /// With falling angles, less than a turn.
+    Reverse,
+    /// As many turns as the angle says, from the zero.
+    Turns,
+}
+
+impl From<WayName> for Way {
+    fn from(name: WayName) -> Self {
+        match name {
+            WayName::Shortest => Self::Shortest,
+            WayName::Forward => Self::Forward,
+            WayName::Reverse => Self::Reverse,
+            WayName::Turns => Self::Turns,
         }
     }
 }
@@ -114,7 +146,7 @@ pub enum StopMode {
 }
 
 /// What is run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RunKind {
     /// Find the origin.
@@ -123,18 +155,21 @@ pub enum RunKind {
     Calibrate,
     /// Measure between the calibrated positions, judge.
     Verify,
+    /// Take down what the detectors of three axes read: from now on, a displacement is what has changed since.
+    Reference,
 }
 
 impl RunKind {
     /// All of them.
-    pub(crate) const ALL: [Self; 3] = [Self::Zero, Self::Calibrate, Self::Verify];
+    pub(crate) const ALL: [Self; 4] = [Self::Zero, Self::Calibrate, Self::Verify, Self::Reference];
 
-    /// What its journals are called when a run can go on with them.
-    pub(crate) const fn verb(self) -> Option<&'static str> {
+    /// What procedures call it.
+    pub(crate) const fn stage(self) -> Stage {
         match self {
-            Self::Zero => None,
-            Self::Calibrate => Some("calibrate"),
-            Self::Verify => Some("verify"),
+            Self::Zero => Stage::Zero,
+            Self::Calibrate => Stage::Calibrate,
+            Self::Verify => Stage::Verify,
+            Self::Reference => Stage::Reference,
         }
     }
 }
@@ -145,7 +180,8 @@ impl RunKind {
 pub struct RunRequest {
     /// What is run.
     pub kind: RunKind,
-    /// Which axis; may be left out when there is only one. The zero of three axes of a volume is of all three.
+    /// Which axis, or `platform` or `volume`: those of a platform or of a volume are run together. May be left out when
+    /// there is only one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
     /// Calibrate: save although the same place measured at the beginning and at the end differs too much.
@@ -170,6 +206,19 @@ impl RunRequest {
             start: true,
         }
     }
+}
+
+/// What a person answers to the question of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AnswerRequest {
+    /// The number of the question: what is asked meanwhile is not answered by it.
+    #[serde(deserialize_with = "whole::read")]
+    #[schema(minimum = 1, maximum = 1000000)]
+    pub question: u32,
+    /// One of its words, or what was read.
+    #[schema(min_length = 1, max_length = 200)]
+    pub answer: String,
 }
 
 /// The right to command, asked for or renewed.

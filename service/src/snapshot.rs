@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use units::{Metres, Time};
 
+use crate::coordinate::Coordinate;
 use crate::figures::Figures;
 use crate::quantity::Quantity;
 use crate::view::{
@@ -25,8 +26,10 @@ pub(crate) struct Fixed {
 #[derive(Debug)]
 pub(crate) struct FixedAxis {
     pub(crate) name: String,
-    pub(crate) soft_min: Metres,
-    pub(crate) soft_max: Metres,
+    /// What it is run with.
+    pub(crate) group: String,
+    /// `None`: it turns endlessly.
+    pub(crate) soft_limits: Option<(Metres, Metres)>,
 }
 
 /// What corrects an axis.
@@ -41,11 +44,11 @@ pub(crate) struct CalibrationInUse {
 #[derive(Clone, Debug)]
 pub(crate) struct AxisSample {
     pub(crate) state: AxisState,
-    pub(crate) encoder: Option<Metres>,
-    pub(crate) place: Option<Metres>,
-    pub(crate) standard_uncertainty: Option<Metres>,
-    pub(crate) target: Option<Metres>,
-    pub(crate) set_point: Option<Metres>,
+    pub(crate) encoder: Option<Coordinate>,
+    pub(crate) place: Option<Coordinate>,
+    pub(crate) standard_uncertainty: Option<Coordinate>,
+    pub(crate) target: Option<Coordinate>,
+    pub(crate) set_point: Option<Coordinate>,
     pub(crate) homed: bool,
     pub(crate) calibration: Option<Arc<CalibrationInUse>>,
     pub(crate) used_by: Option<Arc<str>>,
@@ -129,16 +132,17 @@ impl Snapshot {
 fn view_of(fixed: &FixedAxis, sample: &AxisSample) -> AxisView {
     AxisView {
         name: fixed.name.clone(),
+        group: fixed.group.clone(),
         state: sample.state,
-        position: sample.place.or(sample.encoder).map(Quantity::mm),
+        position: sample.place.or(sample.encoder).map(Coordinate::shown),
         corrected: sample.place.is_some(),
-        standard_uncertainty: sample.standard_uncertainty.map(Quantity::um),
-        encoder: sample.encoder.map(Quantity::mm),
-        target: sample.target.map(Quantity::mm),
-        set_point: sample.set_point.map(Quantity::mm),
+        standard_uncertainty: sample.standard_uncertainty.map(Coordinate::small),
+        encoder: sample.encoder.map(Coordinate::shown),
+        target: sample.target.map(Coordinate::shown),
+        set_point: sample.set_point.map(Coordinate::shown),
         homed: sample.homed,
-        soft_min: Quantity::mm(fixed.soft_min),
-        soft_max: Quantity::mm(fixed.soft_max),
+        soft_min: fixed.soft_limits.map(|it| Quantity::mm(it.0)),
+        soft_max: fixed.soft_limits.map(|it| Quantity::mm(it.1)),
         calibration: sample.calibration.as_ref().map(|it| it.id.clone()),
         calibration_created: sample.calibration.as_ref().map(|it| it.created.clone()),
         used_by: sample.used_by.as_deref().map(str::to_owned),

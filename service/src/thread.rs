@@ -11,19 +11,19 @@ use std::thread::{self, JoinHandle};
 
 use machine::attend;
 use machine::records::Store;
-use serde_json::json;
 use triple_buffer::Input;
-use truestage::linear::Teller;
-use truestage::{Failure, Machine};
+use truestage::runs::{Found, Group, Teller};
+use truestage::{Failure, Machine, groups};
 use wire::cia402::PowerState;
 
 use crate::desk::{Desk, Page};
-use crate::keeper::{Attending, Job, Keeper, Mode, RunTask, answer, cause_of, fixed, seats};
+use crate::keeper::{
+    Attending, Job, Keeper, Mechanics, Mode, RunTask, answer, cause_of, fixed, seats,
+};
 use crate::ledger::{Ledger, LedgerError};
 use crate::manager::{Manager, Watch};
 use crate::order::{Answer, Choice, Letter, Reply};
 use crate::problem::Problem;
-use crate::procedures::{self, Found};
 use crate::request::RunKind;
 use crate::scribe::Scribe;
 use crate::snapshot::{Board, CalibrationInUse, Fixed, Snapshot};
@@ -157,8 +157,11 @@ fn keep(
         held,
         teller,
     } = open()?;
-    let fixed = Arc::new(fixed(&machine)?);
-    let keeper = Keeper::new(inbox, input, seats(&mut machine)?, teller);
+    let groups = groups(machine.config());
+    let fixed = Arc::new(fixed(&mut machine, &groups)?);
+    let seats = seats(&mut machine, &groups)?;
+    let mut keeper = Keeper::new(inbox, input, seats, teller.clone());
+    keeper.add_groups(&mut machine, groups);
     machine.observe(Box::new(keeper.note_taker()));
     let keeper = Rc::new(RefCell::new(keeper));
     attend(&mut machine, Box::new(Attending(Rc::clone(&keeper))));
@@ -177,7 +180,11 @@ fn keep(
     keeper.publish_now(&kept.machine);
     drop(keeper);
     // Whoever started it may have gone.
-    let _ = told.send((fixed, kept.store.clone(), teller.map(|it| it.page)));
+    let _ = told.send((
+        fixed,
+        kept.store.clone(),
+        kept.teller.as_ref().map(|it| it.page),
+    ));
     let ended = kept.live();
     kept.keeper.borrow_mut().dismiss();
     drop(held);
@@ -295,10 +302,9 @@ impl Kept {
             None => stage.rollback(&self.store),
         });
         let id = used.map_err(Problem::from)?;
-        let course = machine.linear(&axis).map(|it| it.course());
-        let course = course.map_err(Problem::from)?;
+        let mechanics = Mechanics::of(machine, &axis).map_err(Problem::from)?;
         let mut keeper = self.keeper.borrow_mut();
-        keeper.set_course(&axis, course, in_use(&self.store, Some(&id)));
+        keeper.set_mechanics(&axis, mechanics, in_use(&self.store, Some(&id)));
         keeper.chosen(machine, &axis, &id, by);
         Ok(Answer::Named(axis))
     }
@@ -314,31 +320,34 @@ impl Kept {
         }
     }
 
-    /// Uses the active calibration of each axis, and says where one cannot be used.
+    /// Uses the active calibration of each axis, and says where one cannot be used; what runs would do depends on
+    /// that, too.
     fn load_courses(&mut self) {
-        for axis in self.machine.devices().axis_names() {
-            let (id, warning) = match self.load(&axis) {
-                Ok(id) => (id, None),
-                Err(failure) => (None, Some(failure)),
+        let groups = self.keeper.borrow().groups();
+        for group in groups {
+            let (in_use, warning) = match group.load(&mut self.machine, &self.store) {
+                Ok(in_use) => (in_use, None),
+                Err(failure) => (Vec::new(), Some(failure)),
             };
-            let course = self.machine.linear(&axis).map(|it| it.course());
-            let mut keeper = self.keeper.borrow_mut();
-            if let Ok(course) = course {
-                keeper.set_course(&axis, course, in_use(&self.store, id.as_deref()));
+            for axis in &group.axes {
+                let id = in_use.iter().find(|it| it.0 == *axis);
+                let id = id.and_then(|it| it.1.as_deref());
+                self.set_mechanics(axis, id);
             }
             if let Some(failure) = warning {
-                keeper.warn(&format!(
-                    "axis {axis}: its calibration is not used: {failure}"
-                ));
+                let what = format!("{}: its calibration is not used: {failure}", called(&group));
+                self.keeper.borrow_mut().warn(&what);
             }
         }
+        self.keeper.borrow_mut().plan_anew(&mut self.machine);
     }
 
-    fn load(&mut self, axis: &str) -> Result<Option<String>, Failure> {
-        if self.machine.config().axis[axis].compensation.is_none() {
-            return Ok(None);
+    fn set_mechanics(&mut self, axis: &str, id: Option<&str>) {
+        if let Ok(mechanics) = Mechanics::of(&mut self.machine, axis) {
+            let in_use = in_use(&self.store, id);
+            let mut keeper = self.keeper.borrow_mut();
+            keeper.set_mechanics(axis, mechanics, in_use);
         }
-        self.machine.linear(axis)?.load_active(&self.store)
     }
 
     /// One run, from its begin to its end.
@@ -348,15 +357,19 @@ impl Kept {
         };
         let result = self.perform(&task);
         self.machine.leave_instrument();
-        let was_stopped = self.keeper.borrow_mut().end_procedure(id);
+        self.keeper.borrow_mut().end_procedure(id);
         match result {
             // The next tick ends the service.
             Err(_) if self.machine.stop_request().is_requested() => {}
-            Ok((result, told)) => {
+            Ok(found) => {
                 self.load_courses();
-                self.keeper.borrow_mut().run_done(id, result, told);
+                self.keeper.borrow_mut().run_done(id, found);
             }
-            Err(failure) if was_stopped && is_stop(&failure) => self.leave(&task),
+            Err(failure) if is_stop(&failure) => {
+                self.leave(&task);
+                let mut keeper = self.keeper.borrow_mut();
+                keeper.run_interrupted(&mut self.machine, id);
+            }
             Err(failure) if stops_the_machine(&failure) => self.failed(failure),
             Err(failure) => {
                 // A verification that finds a calibration harmful takes it out of use.
@@ -369,43 +382,52 @@ impl Kept {
 
     /// Where a run that ended early goes on, if it is one that can.
     fn leave(&mut self, task: &RunTask) {
-        let begun = match (task.request.kind.verb(), &task.axis, &task.resume) {
-            (_, _, Some(journal)) => Some(journal.clone()),
-            (Some(verb), Some(axis), None) => {
-                let found = self.store.interrupted_run(verb, axis);
+        let verb = task.request.kind.stage().text();
+        let begun = match &task.resume {
+            Some(journal) => Some(journal.clone()),
+            None if task.is_resumed => {
+                let found = self.store.interrupted_run(verb, task.group.journals());
                 found.ok().flatten().map(|it| it.journal)
             }
-            _ => None,
+            None => None,
         };
         self.keeper.borrow_mut().run_left(&task.id, begun);
     }
 
     /// Runs that were interrupted before this service began can go on.
     fn offer_runs(&mut self) {
-        for axis in self.machine.devices().axis_names() {
-            let resumable = RunKind::ALL.into_iter();
-            for (kind, verb) in resumable.filter_map(|it| Some((it, it.verb()?))) {
-                let found = self.store.interrupted_run(verb, &axis);
+        let groups = self.keeper.borrow().groups();
+        for group in groups {
+            for kind in RunKind::ALL {
+                let stage = kind.stage();
+                if !group.is_resumed(self.machine.config(), stage) {
+                    continue;
+                }
+                let found = self.store.interrupted_run(stage.text(), group.journals());
                 let mut keeper = self.keeper.borrow_mut();
                 match found {
                     Ok(Some(found)) => keeper.offer_run(kind, &found),
                     Ok(None) => {}
-                    Err(error) => keeper.warn(&format!("axis {axis}: {error}")),
+                    Err(error) => keeper.warn(&format!("{}: {error}", called(&group))),
                 }
             }
         }
     }
 
     fn perform(&mut self, task: &RunTask) -> Result<Found, Failure> {
-        let (machine, store, teller) = (&mut self.machine, &self.store, self.teller);
-        let Some(axis) = &task.axis else {
-            machine.volumetric()?.zero()?;
-            return Ok((json!({}), None));
-        };
-        if task.request.kind != RunKind::Zero {
-            machine.enable(axis)?;
-        }
-        procedures::perform(machine, store, axis, task, teller)
+        let mut person = self.keeper.borrow_mut().asker();
+        let (machine, store, teller) = (&mut self.machine, &self.store, self.teller.as_ref());
+        let procedure = task.of_procedure();
+        task.group
+            .perform(machine, store, &procedure, &mut person, teller)
+    }
+}
+
+/// How people call a group.
+fn called(group: &Group) -> String {
+    match group.axes.as_slice() {
+        [only] => format!("axis {only}"),
+        _ => group.name.clone(),
     }
 }
 

@@ -54,6 +54,9 @@ pub enum AxisState {
 pub struct AxisView {
     /// Its name.
     pub name: String,
+    /// What it is zeroed, calibrated and verified with: itself, `platform` or `volume`.
+    #[serde(default)]
+    pub group: String,
     /// What it does.
     pub state: AxisState,
     /// Where its point stands: corrected by the calibration in use, by the encoder alone where there is none.
@@ -70,10 +73,10 @@ pub struct AxisView {
     pub set_point: Option<Quantity>,
     /// Whether it has its zero.
     pub homed: bool,
-    /// The lower soft limit.
-    pub soft_min: Quantity,
+    /// The lower soft limit; null of an axis that turns endlessly.
+    pub soft_min: Option<Quantity>,
     /// The upper soft limit.
-    pub soft_max: Quantity,
+    pub soft_max: Option<Quantity>,
     /// The calibration in use.
     pub calibration: Option<String>,
     /// When that was made, UTC, RFC 3339.
@@ -263,8 +266,11 @@ pub struct RunView {
     pub id: String,
     /// Who asked for it.
     pub by: String,
-    /// What it is: `zero`, `calibrate` or `verify`.
+    /// What it is: `zero`, `calibrate`, `verify` or `reference`.
     pub kind: crate::request::RunKind,
+    /// What is run: an axis, `platform` or `volume`.
+    #[serde(default)]
+    pub of: String,
     /// The axes that it takes for itself.
     pub axes: Vec<String>,
     /// How far it is.
@@ -275,6 +281,12 @@ pub struct RunView {
     pub steps_done: u64,
     /// Of so many.
     pub steps: u64,
+    /// Whether it can be paused, and go on with what it measured.
+    #[serde(default)]
+    pub can_resume: bool,
+    /// What it waits for a person to do, when it does.
+    #[serde(default)]
+    pub question: Option<QuestionView>,
     /// Who stopped it, when somebody did.
     pub stopped: Option<Stopped>,
     /// Why it has no result.
@@ -284,9 +296,30 @@ pub struct RunView {
     pub result: serde_json::Value,
     /// The same, as the command line prints it.
     pub told: Option<ToldView>,
+    /// Why the result is a bad one, although it is one: out of tolerance.
+    #[serde(default)]
+    pub out_of_tolerance: Option<Cause>,
     /// Where one that ended before its result has what it measured.
     #[serde(default)]
     pub journal: Option<String>,
+}
+
+/// What a run asks a person, and how that can be answered (`POST /v1/runs/{id}/answers`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct QuestionView {
+    /// Its number in this run; an answer names it.
+    pub number: u32,
+    /// What it is about: `turn_plate`, `set_up_line`, `read_line`, `close_placement`.
+    pub what: String,
+    /// For the person.
+    pub text: String,
+    /// The words that answer it.
+    pub answers: Vec<String>,
+    /// Whether any other line of text answers it, too: what was read.
+    pub takes_text: bool,
+    /// What is to be done, for programs.
+    #[schema(value_type = Object)]
+    pub task: serde_json::Value,
 }
 
 impl RunView {
@@ -295,22 +328,26 @@ impl RunView {
         id: &str,
         by: &str,
         kind: crate::request::RunKind,
-        axes: Vec<String>,
+        (of, axes): (&str, Vec<String>),
         plan: RunPlanView,
     ) -> Self {
         Self {
             id: id.to_owned(),
             by: by.to_owned(),
             kind,
+            of: of.to_owned(),
             axes,
             state: RunState::Planned,
             plan,
             steps_done: 0,
             steps: 0,
+            can_resume: false,
+            question: None,
             stopped: None,
             cause: None,
             result: serde_json::Value::Null,
             told: None,
+            out_of_tolerance: None,
             journal: None,
         }
     }
@@ -326,9 +363,9 @@ pub struct ToldView {
     pub value: serde_json::Value,
 }
 
-impl From<truestage::linear::Told> for ToldView {
-    fn from(told: truestage::linear::Told) -> Self {
-        let truestage::linear::Told { text, value } = told;
+impl From<truestage::runs::Told> for ToldView {
+    fn from(told: truestage::runs::Told) -> Self {
+        let truestage::runs::Told { text, value } = told;
         Self { text, value }
     }
 }
@@ -377,7 +414,7 @@ pub struct Event {
     /// When by the machine's clock, in seconds.
     pub clock_s: f64,
     /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`,
-    /// `calibration`, `warning`.
+    /// `calibration`, `question`, `warning`.
     pub kind: String,
     /// Of which axis, motion or run; empty for the machine.
     pub of: String,

@@ -21,6 +21,7 @@ mod programs;
 mod rotary;
 mod screw;
 mod serve;
+mod serve_kinds;
 mod soak;
 mod table;
 mod verbs;

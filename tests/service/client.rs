@@ -4,8 +4,9 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use service::{
-    AxisView, CalibrationView, Caller, Desk, Event, JogRequest, LeaseRequest, Leased, MachineView,
-    MotionView, MoveRequest, Problem, RunKind, RunRequest, RunState, RunView, StopMode,
+    AnswerRequest, AxisView, CalibrationView, Caller, Desk, Event, JogRequest, LeaseRequest,
+    Leased, MachineView, MotionView, MoveRequest, Problem, RunKind, RunRequest, RunState, RunView,
+    StopMode,
 };
 
 use crate::stage::{Gate, Stage};
@@ -34,6 +35,7 @@ pub(crate) trait Client {
     fn abort(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn pause(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem>;
+    fn answer(&self, who: &Caller, id: &str, answer: &AnswerRequest) -> Result<(), Problem>;
     fn runs(&self) -> Vec<RunView>;
     fn run(&self, id: &str, wait: Duration) -> Result<RunView, Problem>;
     fn lease(&self, who: &Caller, request: &LeaseRequest) -> Result<Leased, Problem>;
@@ -140,6 +142,11 @@ impl Client for InProcess {
     fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem> {
         let _passing = self.gate.pass();
         self.desk.resume_run(who, id)
+    }
+
+    fn answer(&self, who: &Caller, id: &str, answer: &AnswerRequest) -> Result<(), Problem> {
+        let _passing = self.gate.pass();
+        self.desk.answer_run(who, id, answer)
     }
 
     fn runs(&self) -> Vec<RunView> {

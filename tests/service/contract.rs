@@ -2,16 +2,19 @@
 
 mod calibrations;
 mod jogs;
+mod kinds;
 mod machine;
 mod motions;
 mod paused;
+mod questions;
 mod repeated;
 mod runs;
+mod turns;
 
 use core::time::Duration;
 use std::path::Path;
 
-use service::{Caller, Code, Length, MotionState, MotionView, MoveRequest, Problem, Speed};
+use service::{Caller, Code, Coordinate, MotionState, MotionView, MoveRequest, Problem, Speed};
 use tests::{Edit, LINEAR, Rig, VOLUMETRIC};
 use units::{Metres, MetresPerSecond};
 
@@ -171,6 +174,6 @@ impl Bed<'_> {
     }
 }
 
-fn length(mm: f64) -> Length {
-    Length(Metres::from_mm(mm))
+fn length(mm: f64) -> Coordinate {
+    Coordinate::Length(Metres::from_mm(mm))
 }

@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use service::{
-    Access, AxisView, CalibrationView, Caller, Edge, Event, JogRequest, LeaseRequest, Leased,
-    Listen, MachineView, MotionView, MoveRequest, Problem, RunRequest, RunView, StopMode,
+    Access, AnswerRequest, AxisView, CalibrationView, Caller, Edge, Event, JogRequest,
+    LeaseRequest, Leased, Listen, MachineView, MotionView, MoveRequest, Problem, RunRequest,
+    RunView, StopMode,
 };
 
 use crate::client::Client;
@@ -242,6 +243,12 @@ impl Client for Http {
 
     fn resume(&self, who: &Caller, id: &str) -> Result<(), Problem> {
         let answer = self.post(who, &format!("/v1/runs/{id}/resume"), "", &json!({}));
+        answer.read::<RunView>().map(|_| ())
+    }
+
+    fn answer(&self, who: &Caller, id: &str, answer: &AnswerRequest) -> Result<(), Problem> {
+        let path = format!("/v1/runs/{id}/answers");
+        let answer = self.post(who, &path, "", &json!(answer));
         answer.read::<RunView>().map(|_| ())
     }
 

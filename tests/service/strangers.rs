@@ -120,7 +120,7 @@ fn the_description_says_where_each_parameter_stands_and_what_a_quantity_is() {
     }
     assert!(orders > 10, "{orders}");
     let schemas = &description["components"]["schemas"];
-    for name in ["LengthIn", "SpeedIn", "TravelSpeedIn"] {
+    for name in ["PlaceIn", "SpeedIn", "TravelSpeedIn"] {
         let [text, object] = &schemas[name]["oneOf"].as_array().unwrap()[..] else {
             panic!("{}", schemas[name]);
         };

@@ -54,6 +54,7 @@ const OF_DATA: &[&str] = &[
 const LISTS: &[&str] = &[
     // A further kind is added here.
     "controller/src/config/model.rs",
+    "controller/src/groups.rs",
     "controller/src/kinds/mod.rs",
     "controller/src/lib.rs",
     "controller/src/program/kind.rs",

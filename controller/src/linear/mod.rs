@@ -28,6 +28,7 @@ mod passes;
 pub(crate) mod positions;
 pub(crate) mod record;
 pub(crate) mod run_plan;
+mod runs;
 pub(crate) mod settings;
 mod sound;
 mod stage;
@@ -49,7 +50,7 @@ pub use log::LinearLog;
 pub use moved::Moved;
 pub use record::LinearContent;
 pub use stage::LinearStage;
-pub use told::{Teller, Told};
+pub use told::LinearTeller;
 pub use verify::VerifyOptions;
 
 // What the rest of this package uses.
@@ -70,6 +71,7 @@ pub(crate) use job::JobConfig;
 pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
+pub(crate) use runs::RUNS;
 #[cfg(feature = "program")]
 pub(crate) use sweep::ZeroPlanned;
 pub(crate) use table_correction::table_correction;

@@ -62,6 +62,15 @@ impl Verified {
     pub fn is_within_tolerance(&self) -> bool {
         self.figures.accuracy.bidirectional <= self.tolerance
     }
+
+    /// What a verification of `axis` with its calibration fails by, where it does.
+    pub(crate) fn out_of_tolerance(&self, axis: &str) -> Option<Failure> {
+        (!self.is_within_tolerance()).then(|| Failure::OutOfTolerance {
+            axis: axis.to_owned(),
+            seen: self.figures.accuracy.bidirectional,
+            limit: self.tolerance,
+        })
+    }
 }
 
 impl LinearStage<'_> {

@@ -23,9 +23,11 @@ mod log;
 mod look;
 pub(crate) mod moves;
 pub(crate) mod record;
+mod runs;
 mod sound;
 pub(crate) mod state;
 mod take_up;
+mod told;
 pub(crate) mod verify;
 mod warnings;
 pub(crate) mod zero;
@@ -36,6 +38,7 @@ pub use failure::PlatformFailure;
 pub use handle::AlignmentPlatform;
 pub use log::PlatformLog;
 pub use record::ScrewContent;
+pub use told::PlatformTeller;
 
 // What the rest of this package uses.
 pub(crate) use config::{
@@ -47,4 +50,5 @@ pub(crate) use log::PlatformEntry;
 #[cfg(feature = "program")]
 pub(crate) use moves::PoseMoved;
 pub(crate) use record::ScrewMethodName;
+pub(crate) use runs::RUNS;
 pub(crate) use state::kinematics;

@@ -87,6 +87,13 @@ impl PlatformVerified {
     pub fn is_within_tolerance(&self) -> bool {
         self.largest <= self.tolerance
     }
+
+    /// What a verification with calibrations fails by, where it does.
+    pub(crate) fn out_of_tolerance(&self) -> Option<Failure> {
+        let (seen, limit) = (self.largest, self.tolerance);
+        let failure = PlatformFailure::OutOfTolerance { seen, limit };
+        (!self.is_within_tolerance()).then(|| failure.into())
+    }
 }
 
 /// How an alignment went.

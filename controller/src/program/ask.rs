@@ -62,8 +62,12 @@ fn text_of(machine: &Value, axes: &Value) -> String {
 }
 
 fn place_of(axis: &Value) -> String {
-    let Some(mm) = axis["position"]["value"].as_f64() else {
+    let Some(place) = axis["position"]["value"].as_f64() else {
         return String::new();
+    };
+    let unit = |name: &str, usual: &str| match axis[name]["unit"].as_str() {
+        Some("um") | None => usual.to_owned(),
+        Some(unit) => plain(unit),
     };
     let homed = if axis["homed"] == true {
         ""
@@ -74,11 +78,14 @@ fn place_of(axis: &Value) -> String {
         axis["corrected"] == true,
         axis["standard_uncertainty"]["value"].as_f64(),
     ) {
-        (true, Some(um)) => format!(" (corrected, u = {um:.3} µm)"),
+        (true, Some(u)) => {
+            let unit = unit("standard_uncertainty", "µm");
+            format!(" (corrected, u = {u:.3} {unit})")
+        }
         (true, None) => " (corrected)".into(),
         (false, _) => " (by its encoder)".into(),
     };
-    format!(" at {mm:.6} mm{by}{homed}")
+    format!(" at {place:.6} {}{by}{homed}", unit("position", "mm"))
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::{self, Loaded};
+use crate::program::answering::Asked;
 use crate::program::intended::{Intent, Step};
 use crate::program::kept::{self, Service};
-use crate::program::kind::by_kind;
+use crate::program::kind::{KINDS, by_kind};
 use crate::program::output::{Ended, Output};
 use crate::program::verbs::Verbs;
 
@@ -100,8 +101,15 @@ fn here(intent: Intent<'_>, kind: &Verbs, output: Output) -> Ended {
 fn there(intent: Intent<'_>, service: &Service, output: Output) -> Ended {
     match intent {
         Intent::Zero(args) => service.zero(&args.axis, output),
-        Intent::Calibrate(args) => service.calibrate(args, output),
-        Intent::Verify(args) => service.verify(args, output),
-        Intent::Move(args) => service.move_to(args, output),
+        Intent::Calibrate(args) => service.calibrate(args, asked(), output),
+        Intent::Verify(args) => service.verify(args, asked(), output),
+        Intent::Move(args) => by_kind(intent.machine(), intent.named().into_iter(), |kind| {
+            service.move_to(args, (kind.motion)(args)?, output)
+        }),
     }
+}
+
+/// What a person is asked by runs of any kind.
+fn asked() -> Vec<&'static Asked> {
+    KINDS.iter().flat_map(|it| it.asked).collect()
 }

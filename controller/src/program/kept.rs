@@ -8,16 +8,19 @@ use std::time::{Duration, Instant};
 
 use machine::records::StoreError;
 use serde_json::{Value, json};
-use units::{Metres, MetresPerSecond};
+use units::MetresPerSecond;
 
 use crate::Failure;
+use crate::program::answering::{Answering, Asked};
 use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::jog::{JogArgs, told};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
-use crate::program::targets::axis_target;
-use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, NEWEST_RUN, VerifyArgs};
+use crate::program::targets::AskedMotion;
+use crate::program::{
+    AskArgs, AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, NEWEST_RUN, VerifyArgs,
+};
 use machine::{Observer as _, Stage, StopRequest};
 
 /// How long an answer is held back: Ctrl-C is looked for so often.
@@ -48,7 +51,22 @@ impl Service {
         tell(&run, output)
     }
 
-    pub(crate) fn calibrate(&self, args: &CalibrateArgs, output: Output) -> Ended {
+    /// Takes down what the detectors of three axes read.
+    pub(crate) fn reference(&self, machine: &MachineArgs, output: Output) -> Ended {
+        refuse(machine.record.is_some(), "--record")?;
+        let stop = stop_request()?;
+        self.zero_first(None, &stop, output)?;
+        let waiting = Waiting::of_nobody(&stop, output);
+        let run = self.run(Stage::Reference, json!({}), None, waiting)?;
+        tell(&run, output)
+    }
+
+    pub(crate) fn calibrate(
+        &self,
+        args: &CalibrateArgs,
+        asked: Vec<&'static Asked>,
+        output: Output,
+    ) -> Ended {
         refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
         refuse(args.no_activate, "--no-activate")?;
         refuse(args.verify, "--verify")?;
@@ -56,43 +74,62 @@ impl Service {
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});
         let resume = args.resume.as_deref();
-        let run = self.run(Stage::Calibrate, request, resume, &stop, output)?;
+        let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
+        let waiting = waiting.who_asks(asked);
+        let run = self.run(Stage::Calibrate, request, resume, waiting)?;
         tell(&run, output)
     }
 
-    pub(crate) fn verify(&self, args: &VerifyArgs, output: Output) -> Ended {
+    pub(crate) fn verify(
+        &self,
+        args: &VerifyArgs,
+        asked: Vec<&'static Asked>,
+        output: Output,
+    ) -> Ended {
         refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "uncompensated": args.uncompensated});
         let resume = args.resume.as_deref();
-        let run = self.run(Stage::Verify, request, resume, &stop, output)?;
-        let um = |name: &str| Metres::from_um(run["result"][name].as_f64().unwrap_or(f64::NAN));
-        if args.uncompensated || run["result"]["within_tolerance"] == true {
+        let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
+        let waiting = waiting.who_asks(asked);
+        let run = self.run(Stage::Verify, request, resume, waiting)?;
+        let Some(exit_code) = exit_code_of(&run["out_of_tolerance"]) else {
             return tell(&run, output);
-        }
-        let failure = Failure::OutOfTolerance {
-            axis: plain(run["axes"][0].as_str().unwrap_or_default()),
-            seen: um("accuracy_um"),
-            limit: um("tolerance_um"),
         };
+        let said = plain(
+            run["out_of_tolerance"]["cause"]
+                .as_str()
+                .unwrap_or_default(),
+        );
         let (text, value) = words_of(&run);
-        output.bad_result(&text, value, failure)
+        output.bad_result(&text, value, Failure::Kept { said, exit_code })
     }
 
-    pub(crate) fn move_to(&self, args: &MoveArgs, output: Output) -> Ended {
+    pub(crate) fn move_to(&self, args: &MoveArgs, asked: AskedMotion, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
         let stop = stop_request()?;
-        let mut targets = serde_json::Map::new();
-        for text in &args.targets {
-            let (axis, target) = axis_target(text)?;
-            self.zero_first(Some(&axis), &stop, output)?;
-            targets.insert(axis, json!({"value": target.mm(), "unit": "mm"}));
+        let AskedMotion { mut request, notes } = asked;
+        let targets = request["targets"].as_object();
+        let axes: Vec<String> = targets
+            .into_iter()
+            .flat_map(|it| it.keys().cloned())
+            .collect();
+        for axis in &axes {
+            self.zero_first(Some(axis), &stop, output)?;
         }
-        let request = json!({"targets": targets, "uncompensated": args.agreed.uncompensated,
-                             "beyond": args.agreed.beyond});
+        request["uncompensated"] = json!(args.agreed.uncompensated);
+        request["beyond"] = json!(args.agreed.beyond);
         let motion = self.motion(&request, &stop)?;
         let legs = motion["axes"].as_object().into_iter().flatten();
-        let (texts, values): (Vec<_>, Vec<_>) = legs.map(|(_, leg)| words_of(leg)).unzip();
+        let told = legs.map(|(axis, leg)| {
+            let (text, value) = words_of(leg);
+            let notes = notes.iter().filter(|it| it.0 == *axis);
+            (
+                notes.fold(text, |text, (_, note)| format!("{text}\n{note}")),
+                value,
+            )
+        });
+        let (texts, values): (Vec<_>, Vec<_>) = told.unzip();
         output.result(&texts.join("\n"), &json!({"moves": values}))
     }
 
@@ -160,13 +197,15 @@ impl Service {
         output: Output,
     ) -> Result<(), Failure> {
         let axes = ask(&self.at, "GET", "/v1/axes", "")?;
-        let mut axes = axes.as_array().into_iter().flatten();
-        let is_meant = |it: &&Value| axis.is_none_or(|axis| it["name"] == axis);
-        match axes.find(is_meant) {
-            Some(found) if found["homed"] == true => Ok(()),
-            // What it says of an axis that is not there is said by the run.
-            _ => self.zero_run(axis, stop, output).map(drop),
+        let axes = axes.as_array().into_iter().flatten();
+        let is_meant =
+            |it: &&Value| axis.is_none_or(|axis| it["name"] == axis || it["group"] == axis);
+        let meant: Vec<&Value> = axes.filter(is_meant).collect();
+        if !meant.is_empty() && meant.iter().all(|it| it["homed"] == true) {
+            return Ok(());
         }
+        // What it says of an axis that is not there is said by the run.
+        self.zero_run(axis, stop, output).map(drop)
     }
 
     fn zero_run(
@@ -175,7 +214,8 @@ impl Service {
         stop: &StopRequest,
         output: Output,
     ) -> Result<Value, Failure> {
-        self.run(Stage::Zero, json!({"axis": axis}), None, stop, output)
+        let waiting = Waiting::of_nobody(stop, output);
+        self.run(Stage::Zero, json!({"axis": axis}), None, waiting)
     }
 
     /// Begins a run, or goes on with the one that is paused, and waits for its end; the service names runs as people
@@ -185,49 +225,62 @@ impl Service {
         stage: Stage,
         mut request: Value,
         resume: Option<&Path>,
-        stop: &StopRequest,
-        output: Output,
+        waiting: Waiting<'_>,
     ) -> Result<Value, Failure> {
         request["kind"] = json!(stage.text());
-        request["start"] = json!(true);
-        let id = match resume {
-            None => self.begin("/v1/runs", &request)?,
-            Some(journal) => {
-                let id = self.paused(&request, journal)?;
-                self.begin(&format!("/v1/runs/{id}/resume"), &json!({}))?
-            }
+        let (run, verb) = match resume {
+            None => (
+                ask(&self.at, "POST", "/v1/runs", &request.to_string())?,
+                "start",
+            ),
+            Some(journal) => (self.paused(&request, journal)?, "resume"),
         };
-        let mut bars = Bars::new(output.is_json());
-        // What measures can go on later; a zero cannot.
-        let ending = if stage == Stage::Zero {
-            "abort"
-        } else {
-            "pause"
+        let path = format!("/v1/runs/{}", plain(run["id"].as_str().unwrap_or_default()));
+        let mut person = waiting.person(&run["plan"])?;
+        self.begin(&format!("{path}/{verb}"), &json!({}))?;
+        let mut bars = Bars::new(waiting.output.is_json());
+        let ending = match run["can_resume"] == true {
+            true => "pause",
+            false => "abort",
         };
-        let ender = format!("/v1/runs/{id}/{ending}");
-        self.end_of(&format!("/v1/runs/{id}"), &ender, stop, |run| {
+        let ender = format!("{path}/{ending}");
+        self.end_of(&path, &ender, waiting.stop, |run| {
             let of = |name: &str| run[name].as_u64().unwrap_or(0);
-            let axis = plain(run["axes"][0].as_str().unwrap_or_default());
+            let axis = plain(run["of"].as_str().unwrap_or_default());
             if of("steps") > 0 {
                 bars.progress(stage, &axis, of("steps_done"), of("steps"));
+            }
+            match &mut person {
+                Some(person) => self.answer(&path, run, person),
+                None => Ok(()),
             }
         })
     }
 
-    /// The name of the newest run that is paused and of the kind and axis that `request` asks for; or the one of
+    /// Puts what the run at `path` asks to the person at this end, and passes his answer on.
+    fn answer(&self, path: &str, run: &Value, person: &mut Answering) -> Result<(), Failure> {
+        let Some((number, answer)) = person.look(&run["question"])? else {
+            return Ok(());
+        };
+        let body = json!({"question": number, "answer": answer}).to_string();
+        // Somebody else may have answered or stopped it: the next look says so.
+        let _ = ask_on(&self.at, "POST", &format!("{path}/answers"), &body);
+        Ok(())
+    }
+
+    /// The newest run that is paused and of the kind and axis that `request` asks for; or the one of
     /// `journal`, where a file is named.
-    fn paused(&self, request: &Value, journal: &Path) -> Result<String, Failure> {
+    fn paused(&self, request: &Value, journal: &Path) -> Result<Value, Failure> {
         let runs = ask(&self.at, "GET", "/v1/runs", "")?;
         let is_meant = |run: &&Value| {
-            let of_axis = request["axis"].is_null() || run["axes"][0] == request["axis"];
+            let of_axis = request["axis"].is_null() || run["of"] == request["axis"];
             let left = run["journal"].as_str().map(Path::new);
             let of_journal = journal == Path::new(NEWEST_RUN)
                 || left.is_some_and(|it| it.file_name() == journal.file_name());
             run["state"] == "paused" && run["kind"] == request["kind"] && of_axis && of_journal
         };
         let found = runs.as_array().into_iter().flatten().rfind(is_meant);
-        let id = found.and_then(|run| run["id"].as_str()).map(plain);
-        id.ok_or_else(|| Failure::Usage {
+        found.cloned().ok_or_else(|| Failure::Usage {
             what: format!(
                 "the service knows no {} run that was interrupted and can go on",
                 plain(request["kind"].as_str().unwrap_or_default())
@@ -238,7 +291,7 @@ impl Service {
 
     fn motion(&self, request: &Value, stop: &StopRequest) -> Result<Value, Failure> {
         let id = self.begin("/v1/motions", request)?;
-        self.end_of(&format!("/v1/motions/{id}"), "/v1/stop", stop, |_| ())
+        self.end_of(&format!("/v1/motions/{id}"), "/v1/stop", stop, |_| Ok(()))
     }
 
     /// The name of what was begun.
@@ -253,20 +306,26 @@ impl Service {
         path: &str,
         ender: &str,
         stop: &StopRequest,
-        mut meanwhile: impl FnMut(&Value),
+        mut meanwhile: impl FnMut(&Value) -> Result<(), Failure>,
     ) -> Result<Value, Failure> {
         let mut is_ending = false;
+        let mut trouble = None;
         loop {
-            if stop.is_requested() && !is_ending {
+            if (stop.is_requested() || trouble.is_some()) && !is_ending {
                 is_ending = true;
                 // Refused when it has just ended, unheard when the service has: the next look says which.
                 let _ = ask_on(&self.at, "POST", ender, "{}");
             }
             let wait_s = WAIT.as_secs_f64();
             let seen = ask_on(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
-            meanwhile(&seen);
+            if trouble.is_none() {
+                trouble = meanwhile(&seen).err();
+            }
             match seen["state"].as_str() {
                 Some("done") => return Ok(seen),
+                Some("stopped" | "paused") if trouble.is_some() => {
+                    return trouble.map_or(Ok(seen), Err);
+                }
                 Some("stopped") if is_ending => return Err(stop.failure().into()),
                 Some("paused") => return Err(paused(&seen, is_ending.then(|| stop.failure()))),
                 Some("stopped") => return Err(stopped(&seen)),
@@ -274,6 +333,50 @@ impl Service {
                 _ => {}
             }
         }
+    }
+}
+
+/// Who waits for a run at this end.
+struct Waiting<'w> {
+    stop: &'w StopRequest,
+    output: Output,
+    /// Whether what is asked is done without waiting for it, and where an emulated machine's hand does it.
+    by: (bool, Option<&'w Path>),
+    /// How each question is put to a person.
+    asked: Vec<&'static Asked>,
+}
+
+impl<'w> Waiting<'w> {
+    fn of(args: &'w AxisArgs, ask: &AskArgs, stop: &'w StopRequest, output: Output) -> Self {
+        Self {
+            by: (ask.yes, args.machine.hand()),
+            ..Self::of_nobody(stop, output)
+        }
+    }
+
+    fn of_nobody(stop: &'w StopRequest, output: Output) -> Self {
+        Self {
+            stop,
+            output,
+            by: (false, None),
+            asked: Vec::new(),
+        }
+    }
+
+    fn who_asks(self, asked: Vec<&'static Asked>) -> Self {
+        Self { asked, ..self }
+    }
+
+    /// Whoever answers, where a run of this plan asks something.
+    ///
+    /// # Errors
+    /// When nobody can: nothing has begun then.
+    fn person(&self, plan: &Value) -> Result<Option<Answering>, Failure> {
+        let asks = plan["asks"].as_array();
+        if asks.is_none_or(|it| it.is_empty()) {
+            return Ok(None);
+        }
+        Answering::new(self.by, self.asked.clone(), self.output).map(Some)
     }
 }
 

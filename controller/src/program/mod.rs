@@ -1,6 +1,7 @@
 //! The command line. Its words are the cycle's own.
 
 mod align;
+mod answering;
 mod ask;
 mod before;
 mod belongs;

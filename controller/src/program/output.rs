@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::ConfigError;
-use crate::linear::Told;
+use crate::runs::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
 /// it), or with no result.

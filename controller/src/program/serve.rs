@@ -5,13 +5,13 @@ use std::io;
 use std::path::{self, PathBuf};
 use std::sync::{Arc, OnceLock, Weak};
 
-use crate::linear::Teller;
 use crate::ports::Use;
-use crate::program::ServeArgs;
-use crate::program::linear::told::TELLER;
+use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::report::html;
 use crate::program::session::Session;
+use crate::program::{ServeArgs, json};
+use crate::runs::Teller;
 use crate::{Failure, Machine};
 use machine::records::{Lease, Store};
 
@@ -79,8 +79,9 @@ pub(crate) fn run(
         }),
         // Pages of journals of any kind: whatever has worked on this machine left its own.
         teller: Teller {
+            counters: |machine| json::counters(&machine.devices().counters()),
             page: html,
-            ..TELLER
+            words: KINDS.iter().map(|kind| kind.words).collect(),
         },
         announce: Box::new(move |places| announce(&taken, places)),
         told: Box::new(move |text| output.note(text)),

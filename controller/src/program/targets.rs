@@ -1,5 +1,6 @@
 //! Targets as a person types them: the unit is never guessed.
 
+use serde_json::{Map, Value, json};
 use units::Metres;
 use units::text::length;
 
@@ -29,6 +30,25 @@ pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {
         return Err(usage());
     }
     Ok((axis.to_owned(), length))
+}
+
+/// A move as a service is asked for it.
+pub(crate) struct AskedMotion {
+    /// What the request says, but for what whoever asks agrees to.
+    pub(crate) request: Value,
+    /// What is to be said of an axis besides what the service says.
+    pub(crate) notes: Vec<(String, String)>,
+}
+
+/// The move of linear axes, each by itself.
+pub(crate) fn axis_motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
+    let targets = axis_targets(args)?.into_iter();
+    let targets = targets.map(|(axis, it)| (axis, json!({"value": it.mm(), "unit": "mm"})));
+    let targets: Map<String, Value> = targets.collect();
+    Ok(AskedMotion {
+        request: json!({"targets": targets}),
+        notes: Vec::new(),
+    })
 }
 
 #[cfg(test)]

@@ -4,13 +4,16 @@ use std::path::Path;
 
 use machine::records::Store;
 
+use super::answering::Asked;
 use super::demo::stand::Demo;
 use super::intended::{Intent, Step};
 use super::output::{Ended, Output};
 use super::show::Shown;
+use super::targets::AskedMotion;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::Failure;
 use crate::config::{Loaded, MachineConfig};
+use crate::runs::Words;
 
 /// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {
@@ -32,6 +35,12 @@ pub(crate) struct Verbs {
     pub(crate) calibrate: fn(&CalibrateArgs, Output) -> Ended,
     pub(crate) verify: fn(&VerifyArgs, Output) -> Ended,
     pub(crate) move_to: fn(&MoveArgs, Output) -> Ended,
+    /// A move as a service is asked for it.
+    pub(crate) motion: fn(&MoveArgs) -> Result<AskedMotion, Failure>,
+    /// What a person is asked by its runs, when a service does them.
+    pub(crate) asked: &'static [Asked],
+    /// What its runs and moves gave, for whoever keeps a machine: a teller of its own.
+    pub(crate) words: Words,
     /// What its calibrations say.
     pub(crate) shown: &'static [Shown],
     /// By what its journals are known.

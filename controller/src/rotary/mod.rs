@@ -12,9 +12,11 @@
 //! | table position p, line n | line n of a placement with offset s is read at p = n + s |
 //! | pass | one turn over all lines, in one direction |
 
+mod asked;
 pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
+mod course;
 mod dependence;
 mod entries;
 pub(crate) mod estimate;
@@ -32,6 +34,7 @@ mod placement;
 mod plate_journal;
 mod plate_run;
 pub(crate) mod record;
+mod runs;
 pub(crate) mod settings;
 pub(crate) mod sighted;
 mod sighting;
@@ -40,33 +43,36 @@ mod sound;
 pub(crate) mod subject;
 pub(crate) mod sweep;
 mod table;
+mod told;
 mod turn;
 pub(crate) mod verify;
 mod warnings;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
+pub use course::{PlannedTurn, TableCourse};
 pub use failure::RotaryFailure;
 pub use log::PlateLog;
 pub use operator::{Operator, PlateMove, PlateTask};
 pub use record::RotaryContent;
 pub use sweep::SweepOptions;
 pub use table::RotaryTable;
+pub use told::RotaryTeller;
 pub use turn::Way;
 
 // What the rest of this package uses.
-#[cfg(feature = "program")]
 pub(crate) use calibrate::RotaryCalibrated;
 pub(crate) use config::{
     DirectionName, EdgeName, LineDetectorConfig, LineSideName, LineSignalConfig,
     PeriodicInterpolationName, PositionRangeName, RotaryCalibrateConfig, RotaryCompensationConfig,
     RotaryConfig, RotaryDevice, RotaryVerifyConfig, SightingConfig,
 };
+pub(crate) use course::RotaryMoved;
 pub(crate) use entries::{
     JudgedEntry, PlacementEntry, PlatePlanEntry, SightedAt, SightedEntry, SweepEntry,
 };
 pub(crate) use in_use::TableInUse;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlateEntry;
+pub(crate) use runs::RUNS;
 pub(crate) use sweep::Sweep;
-#[cfg(feature = "program")]
 pub(crate) use verify::RotaryVerified;

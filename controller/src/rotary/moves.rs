@@ -4,24 +4,9 @@ use compensator::rotary::PeriodicCompensation;
 use units::Radians;
 
 use crate::failure::Failure;
-use crate::rotary::Way;
-use crate::rotary::failure::RotaryFailure;
 use crate::rotary::table::RotaryTable;
+use crate::rotary::{RotaryMoved, Way};
 use crate::store::Store;
-
-/// A move of a rotary axis that was made. Angles count on over the turns.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RotaryMoved {
-    /// Where the table was told to be.
-    pub target: Radians,
-    /// What the drive was sent.
-    pub set_point: Radians,
-    /// Where it is by the drive's reading and the calibration.
-    pub expected: Radians,
-    /// Standard uncertainty of the correction there, where known. What all angles have in common,
-    /// where the zero is, is not in it.
-    pub standard_uncertainty: Option<Radians>,
-}
 
 impl RotaryTable<'_> {
     /// Turns the table to `angle`, compensated where it has a calibration.
@@ -30,35 +15,10 @@ impl RotaryTable<'_> {
     /// Before anything moves: not zeroed, no angle. While moving: whatever stops the machine.
     pub fn move_to(&mut self, angle: Radians, way: Way) -> Result<RotaryMoved, Failure> {
         self.core.require_zeroed(self.axis)?;
-        let not_an_angle = |source| RotaryFailure::NotAnAngle {
-            axis: self.axis.to_owned(),
-            source,
-        };
-        let Some(compensation) = self.compensation().cloned() else {
-            let target = self.turn_to(angle, way)?;
-            return Ok(RotaryMoved {
-                target,
-                set_point: target,
-                expected: self.reading()?,
-                standard_uncertainty: None,
-            });
-        };
-        let near = Radians::from_arcsec(self.config.position_window_arcsec);
-        let reading = self.reading()?;
-        // Turns are counted and ways are chosen by where the table is, not by what it reads.
-        let here = reading + compensation.deviation(reading).map_err(not_an_angle)?;
-        let target = way.target(here, angle, near);
-        let set_point = compensation.set_point(target).map_err(not_an_angle)?;
-        self.turn_to(set_point, Way::Turns)?;
-        let reading = self.reading()?;
-        let deviation = compensation.deviation(reading).map_err(not_an_angle)?;
-        let uncertainty = compensation.standard_uncertainty(set_point);
-        Ok(RotaryMoved {
-            target,
-            set_point,
-            expected: reading + deviation,
-            standard_uncertainty: uncertainty.map_err(not_an_angle)?,
-        })
+        let course = self.course();
+        let planned = course.plan(self.axis, self.reading()?, angle, way)?;
+        self.turn_to(planned.set_point, Way::Turns)?;
+        Ok(course.moved(&planned, self.reading()?))
     }
 
     /// Loads the calibration that `store` says is active for the table, after

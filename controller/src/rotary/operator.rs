@@ -1,10 +1,13 @@
 //! The person who turns the plate.
 
+use serde::{Deserialize, Serialize};
+
 use crate::failure::Failure;
 
 /// What is to be done with the plate. Lines are those of the plate; a plate turned by some lines
 /// is read so many line spacings later, at larger angles of the table.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PlateMove {
     /// Fix it, no matter how: this is the first placement.
     Fix,
@@ -26,7 +29,7 @@ pub enum PlateMove {
 }
 
 /// A placement that is asked for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlateTask {
     /// The table's axis.
     pub axis: String,
@@ -43,6 +46,9 @@ pub struct PlateTask {
 }
 
 impl PlateTask {
+    /// What whoever keeps the machine calls it.
+    pub(crate) const WHAT: &'static str = "turn_plate";
+
     /// For the person.
     pub fn text(&self) -> String {
         let turn = |lines: f64, from: &str| {

@@ -93,6 +93,17 @@ impl RotaryVerified {
         left.is_some_and(|it| it.largest <= self.tolerance)
     }
 
+    /// What a verification of `axis` that was to be within the tolerance failed by.
+    pub(crate) fn out_of_tolerance(&self, axis: &str) -> Option<Failure> {
+        let left = self.left.as_ref()?;
+        let failure = RotaryFailure::OutOfTolerance {
+            axis: axis.to_owned(),
+            seen: left.largest,
+            limit: self.tolerance,
+        };
+        (!self.is_within_tolerance()).then(|| failure.into())
+    }
+
     fn entry(&self) -> JudgedEntry {
         let of = |figures: &RotaryFigures| {
             let values = figures.deviations.iter();

@@ -18,6 +18,7 @@
 //! | `inputs` | which of the engine's channels belong to each detector, and whether its value is accepted |
 //! | `thermometers` | the same for the thermometers; those that belong together fail together |
 
+mod asked;
 pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
@@ -41,12 +42,14 @@ pub(crate) mod memory_import;
 mod moves;
 pub(crate) mod record;
 pub(crate) mod reference;
+mod runs;
 pub(crate) mod settings;
 #[cfg(feature = "program")]
 pub(crate) mod sight;
 mod sound;
 mod state;
 mod thermometers;
+mod told;
 pub(crate) mod verify;
 mod warnings;
 mod zero;
@@ -60,11 +63,13 @@ pub use line::{LineOperator, LineOptics, LineTask};
 pub use log::VolumeLog;
 pub use moves::Mover;
 pub use record::{GeometryContent, MemoryName, StateMemoryContent};
+pub use told::VolumetricTeller;
 pub use verify::VerifyBy;
 
 // What the rest of this package uses.
-pub(crate) use calibrate::Scatter;
 #[cfg(feature = "program")]
+pub(crate) use asked::AskedLine;
+pub(crate) use calibrate::Scatter;
 pub(crate) use calibrate::VolumetricCalibrated;
 pub(crate) use config::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, BeamsConfig, BendConfig, CurvePointConfig,
@@ -95,4 +100,5 @@ pub(crate) use record::{
     ExpansionRecord, FunctionRecord, FunctionShape, UnknownRecord,
 };
 pub(crate) use reference::References;
+pub(crate) use runs::RUNS;
 pub(crate) use state::{GEOMETRY, REFERENCES, VolumetricRecords, memory_pointer};

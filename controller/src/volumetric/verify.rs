@@ -75,6 +75,15 @@ impl VolumetricVerified {
     pub fn is_within_tolerance(&self) -> bool {
         self.range <= self.limit
     }
+
+    /// What a verification with corrections fails by, where it does.
+    pub(crate) fn out_of_tolerance(&self) -> Option<Failure> {
+        let failure = VolumetricFailure::OutOfTolerance {
+            seen: self.range,
+            limit: self.limit,
+        };
+        (!self.is_within_tolerance()).then(|| failure.into())
+    }
 }
 
 impl WorkVolume<'_> {
@@ -121,7 +130,18 @@ impl WorkVolume<'_> {
         self.mover_by(store, by).map(|_| ())
     }
 
-    fn verify_config(&self) -> Result<VolumetricVerifyConfig, Failure> {
+    /// The line that is read.
+    pub(super) fn verified_line(&self, own: &VolumetricVerifyConfig) -> LineTask {
+        LineTask {
+            optics: LineOptics::Linear,
+            start: point_of_mm(own.from_mm),
+            end: point_of_mm(own.to_mm),
+            tool: point_of_mm(self.config.tool_offset_mm),
+            step: (1, 1),
+        }
+    }
+
+    pub(super) fn verify_config(&self) -> Result<VolumetricVerifyConfig, Failure> {
         let section = "verify";
         let own = self.config.verify.clone();
         Ok(own.ok_or(VolumetricFailure::NotConfigured { section })?)
@@ -168,14 +188,8 @@ impl WorkVolume<'_> {
         let section = "calibrate";
         let calibrate = config.calibrate.as_ref();
         let calibrate = calibrate.ok_or(VolumetricFailure::NotConfigured { section })?;
-        let (from, to) = (point_of_mm(own.from_mm), point_of_mm(own.to_mm));
-        let task = LineTask {
-            optics: LineOptics::Linear,
-            start: from,
-            end: to,
-            tool: point_of_mm(config.tool_offset_mm),
-            step: (1, 1),
-        };
+        let task = self.verified_line(own);
+        let (from, to) = (task.start, task.end);
         let readout = LineReadout {
             instrument: calibrate.instrument.clone(),
             settle: Duration::from_secs_f64(calibrate.settle_ms * 1e-3),

@@ -27,7 +27,7 @@ use super::pace::Pace;
 use super::seats::Seats;
 use super::{AXES_MAX, Cause, Engine, EngineFailure, PerAxis};
 use crate::failure::Failure;
-use crate::machine::{Machine, Supervision};
+use crate::machine::{Machine, Supervision, call_attendant};
 use crate::parts::{Bus, CyclicSettings};
 
 /// The share of a period in which answers are awaited.
@@ -220,8 +220,10 @@ impl Run<'_> {
     fn with_own_sync(&mut self, host: &mut dyn FnMut()) -> Result<Cause, Failure> {
         let machine = &mut *self.machine;
         machine.ports.set_sync(&mut *machine.transport, false)?;
+        machine.follows = true;
         let outcome = self.run_periods(host);
         let machine = &mut *self.machine;
+        machine.follows = false;
         let given_back = machine.ports.set_sync(&mut *machine.transport, true);
         let result = outcome?;
         given_back.map(|()| result)
@@ -243,6 +245,8 @@ impl Run<'_> {
             match period {
                 Ok(None) => host(),
                 Ok(Some(cause)) => return Ok(cause),
+                // Whoever attends to the machine has told every drive already.
+                Err(Failure::Interrupted) => return Err(Failure::Interrupted),
                 Err(failure) => {
                     let now = self.machine.now();
                     let failure = self.machine.bus_watch.explain(now, failure);
@@ -293,7 +297,24 @@ impl Run<'_> {
         let engine = &mut *self.engine;
         engine.timing.work.note(work);
         pace.deadline += engine.period;
-        Ok(engine.core.ended())
+        let ended = engine.core.ended();
+        self.be_attended()?;
+        Ok(ended)
+    }
+
+    /// Whoever attends to the machine looks after it once in every period. Where he ends what runs, the axes stop
+    /// together, or have been told to by him.
+    fn be_attended(&mut self) -> Result<(), Failure> {
+        match call_attendant(self.machine) {
+            Ok(()) => Ok(()),
+            Err(Failure::Interrupted) if self.machine.follows => {
+                let late_answers = self.engine.timing.late_answers;
+                let axes = engine_axes(&self.engine.axes);
+                let stopped = self.engine.core.stop(Cause::Asked);
+                stopped.map_err(|it| trouble_to_failure(axes, late_answers, it))
+            }
+            Err(failure) => Err(failure),
+        }
     }
 
     /// Waits for the deadline and sends SYNC. Returns how many SYNCs were missed, beyond what

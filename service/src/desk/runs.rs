@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::{Desk, LOOK_EVERY};
 use crate::order::Order;
 use crate::problem::{Code, Problem};
-use crate::request::{Caller, RunRequest};
+use crate::request::{AnswerRequest, Caller, RunRequest};
 use crate::view::RunView;
 
 /// Runs.
@@ -64,6 +64,20 @@ impl Desk {
     pub fn resume_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
         let run = id.to_owned();
         self.done(caller, Order::Resume { run })
+    }
+
+    /// Answers the question that the run `id` waits with.
+    ///
+    /// # Errors
+    /// When it asks nothing, asks something else, or cannot be answered so.
+    pub fn answer_run(
+        &self,
+        caller: &Caller,
+        id: &str,
+        answer: &AnswerRequest,
+    ) -> Result<(), Problem> {
+        let (run, answer) = (id.to_owned(), answer.clone());
+        self.done(caller, Order::Answer { run, answer })
     }
 
     /// The run `id`.

@@ -24,12 +24,11 @@ pub(super) fn needed(method: &Method, path: &str) -> Role {
     }
 }
 
-/// What a run of this kind needs: those that change how positions are corrected are for commissioners, and so is
-/// whatever is not known here.
+/// What a run of this kind needs: those that change how positions are corrected are for commissioners.
 pub(super) const fn of_run(kind: RunKind) -> Role {
     match kind {
         RunKind::Zero | RunKind::Verify => Role::Operator,
-        _ => Role::Commissioner,
+        RunKind::Calibrate | RunKind::Reference => Role::Commissioner,
     }
 }
 

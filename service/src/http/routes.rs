@@ -41,7 +41,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
         description = "One machine, kept zeroed, enabled and supervised. Not a safety function: wire STO.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
-    components(schemas(crate::quantity::LengthIn)),
+    components(schemas(crate::quantity::PlaceIn)),
     tags(
         (name = "machine", description = "The machine and its axes"),
         (name = "motions", description = "Motions; their end is a level"),
@@ -85,6 +85,7 @@ fn routed() -> (Router<State>, OpenApi) {
         .routes(routes!(runs::abort))
         .routes(routes!(runs::pause))
         .routes(routes!(runs::resume))
+        .routes(routes!(runs::answer))
         .routes(routes!(journals::journals))
         .routes(routes!(journals::journal))
         .routes(routes!(journals::report))

@@ -1,10 +1,13 @@
 //! The machine's thread: what is done after every tick.
 
 mod events;
+mod groups;
 mod lease;
+mod mechanics;
 mod motion;
 mod orders;
 mod publish;
+mod question;
 mod run;
 mod seat;
 mod setup;
@@ -19,7 +22,7 @@ use std::sync::mpsc::Receiver;
 use machine::{Attendant, Failure, Machine, Observer, Stage};
 use serde_json::json;
 use triple_buffer::Input;
-use truestage::linear::Teller;
+use truestage::runs::Teller;
 
 use crate::figures::Book;
 use crate::order::{Answered, Choice, Letter, Reply};
@@ -27,9 +30,12 @@ use crate::snapshot::Snapshot;
 use crate::view::Cause;
 use events::Events;
 pub(crate) use events::utc_now;
+use groups::Grouped;
 use lease::Lease;
+pub(crate) use mechanics::Mechanics;
 use motion::Motions;
 pub(crate) use orders::answer;
+use question::Talk;
 use run::Runs;
 pub(crate) use run::Task as RunTask;
 pub(crate) use seat::Seat;
@@ -98,11 +104,13 @@ impl Observer for NoteTaker {
 pub(crate) struct Keeper {
     inbox: Receiver<Letter>,
     seats: Vec<Seat>,
+    groups: Vec<Grouped>,
     motions: Motions,
     runs: Runs,
     events: Events,
     lease: Option<Lease>,
     notes: Notes,
+    talk: Rc<RefCell<Talk>>,
     fault: Option<Arc<Cause>>,
     mode: Mode,
     job: Option<Job>,
@@ -125,11 +133,13 @@ impl Keeper {
         Self {
             inbox,
             seats,
+            groups: Vec::new(),
             motions: Motions::default(),
             runs: Runs::default(),
             events: Events::default(),
             lease: None,
             notes: Notes::default(),
+            talk: Rc::default(),
             fault: None,
             mode: Mode::Starting,
             job: None,
@@ -168,6 +178,7 @@ impl Keeper {
         self.ticks += 1;
         self.events.set_now(machine.now());
         self.take_notes();
+        self.take_question();
         for _ in 0..ORDERS_A_TICK {
             let Ok(letter) = self.inbox.try_recv() else {
                 break;

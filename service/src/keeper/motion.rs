@@ -1,6 +1,7 @@
 //! Motions: state machines that every tick carries on. Their end is a level.
 
 mod accept;
+mod going;
 mod jog;
 mod shown;
 
@@ -8,15 +9,16 @@ use core::time::Duration;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use machine::{Failure, Machine, Moving};
+use machine::{Failure, Machine};
 use serde_json::json;
-use truestage::Agreed;
-use truestage::linear::{Corrected, PlannedMove};
-use units::{Metres, MetresPerSecond, Time};
+use truestage::linear::Corrected;
+use units::{MetresPerSecond, Time};
 
+use self::going::{Going, Wanted};
 use super::Keeper;
 use super::seat::{Seat, Task};
 use super::stop::{cause_of, stopped_by};
+use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
 use crate::view::{Cause, MotionView, Stopped};
 
@@ -59,15 +61,16 @@ enum LegPhase {
 #[derive(Clone, Debug)]
 struct Leg {
     at: usize,
-    target: Metres,
-    planned: Option<PlannedMove>,
+    /// Where it was asked to go.
+    target: Coordinate,
+    going: Option<Going>,
     deadline: Time,
     phase: LegPhase,
 }
 
 impl Leg {
     fn corrected(&self) -> Corrected {
-        self.planned.map_or(Corrected::No, |it| it.corrected)
+        self.going.map_or(Corrected::No, |it| it.corrected())
     }
 
     /// Whether it has made all of its move.
@@ -82,8 +85,7 @@ pub(super) struct Motion {
     id: Arc<str>,
     by: String,
     accepted: String,
-    speed: Option<MetresPerSecond>,
-    agreed: Agreed,
+    wanted: Wanted,
     dead_man: Option<(Duration, Time)>,
     /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
     jog: Option<MetresPerSecond>,
@@ -163,37 +165,36 @@ impl Keeper {
     fn begin_legs(&mut self, machine: &mut Machine, motion: &mut Motion) -> Result<(), Failure> {
         motion.phase = Phase::Moving;
         for leg in &mut motion.legs {
-            let Some(planned) = leg.planned else { continue };
+            let Some(going) = leg.going else { continue };
             let seat = &mut self.seats[leg.at];
-            let moves = 1 + u32::from(planned.by_way_of.is_some());
-            let limit = seat.settings.move_timeout * moves + SETTLING;
+            let by_way_of = going.by_way_of();
+            let moves = 1 + u32::from(by_way_of.is_some());
+            let limit = seat.move_timeout * moves + SETTLING;
             let limit = machine.patience().of(limit);
             let id = Arc::clone(&motion.id);
             (leg.deadline, seat.task) = match motion.jog {
                 None => (machine.now() + limit + seat.in_position, Task::Motion(id)),
                 Some(_) => (Time::NEVER, Task::Jog(id)),
             };
-            seat.target = Some(leg.target);
-            let (phase, first) = match planned.by_way_of {
+            seat.target = Some(going.target(leg.target));
+            let (phase, first) = match by_way_of {
                 Some(from) => (LegPhase::OnTheWay, from),
-                None => (LegPhase::Moving, planned.set_point),
+                None => (LegPhase::Moving, going.set_point()),
             };
             leg.phase = phase;
             seat.set_point = Some(first);
-            Moving::of(machine, &seat.name)?.begin(first, planned.speed)?;
+            going.begin(machine, &seat.name, first)?;
         }
         Ok(())
     }
 
     /// Carries on a leg whose drive has called its target reached.
     fn arrive(machine: &mut Machine, leg: &mut Leg, seat: &mut Seat) -> Result<(), Failure> {
-        let mut moving = Moving::of(machine, &seat.name)?;
-        moving.arrived(seat.set_point.unwrap_or(leg.target));
-        match leg.planned {
-            Some(planned) if leg.phase == LegPhase::OnTheWay => {
+        match leg.going {
+            Some(going) if leg.phase == LegPhase::OnTheWay => {
                 leg.phase = LegPhase::Moving;
-                seat.set_point = Some(planned.set_point);
-                moving.begin(planned.set_point, planned.speed)
+                seat.set_point = Some(going.set_point());
+                going.begin(machine, &seat.name, going.set_point())
             }
             _ => {
                 leg.phase = LegPhase::Settling;
@@ -228,9 +229,8 @@ impl Keeper {
         for leg in &mut self.motions.active[number].legs {
             let seat = &mut self.seats[leg.at];
             if matches!(leg.phase, LegPhase::OnTheWay | LegPhase::Moving)
-                && let Some(outcome) = machine.outcome(&seat.name)?
+                && Going::has_arrived(machine, &seat.name, seat.set_point)?
             {
-                outcome?;
                 Self::arrive(machine, leg, seat)?;
             }
             if leg.phase == LegPhase::Settling && seat.is_in_position(now) {
@@ -254,7 +254,7 @@ impl Keeper {
         cause_of(&truestage::Failure::from(Failure::Overdue {
             device: self.name(leg.at).to_string(),
             step: "move",
-            waited: self.seats[leg.at].settings.move_timeout,
+            waited: self.seats[leg.at].move_timeout,
         }))
     }
 
@@ -339,7 +339,7 @@ impl Keeper {
             &motion,
             &self.seats,
             machine,
-            self.teller,
+            self.teller.as_ref(),
             end,
         ));
         for (axis, leg) in &view.axes {
@@ -373,13 +373,9 @@ impl Keeper {
     /// What is known of an axis at rest after a motion.
     fn settle(&mut self, machine: &Machine, leg: &Leg) {
         let seat = &mut self.seats[leg.at];
-        let approach = seat.approach(machine);
-        let reading = machine.reading(&seat.name).ok().flatten();
-        let combined = reading.and_then(|it| {
-            let position = it.position;
-            seat.course
-                .uncertainty_at(position, approach, leg.has_arrived())
-        });
-        seat.standard_uncertainty = combined.map(|it| it.standard_uncertainty);
+        let has_arrived = leg.has_arrived();
+        let mechanics = &seat.mechanics;
+        seat.standard_uncertainty =
+            mechanics.standard_uncertainty(machine, &seat.name, has_arrived);
     }
 }

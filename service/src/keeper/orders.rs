@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use machine::{Machine, Moving};
+use machine::{Driving, Machine};
+use truestage::runs::Moved;
 
-use super::seat::{MovedBy, Task};
+use super::seat::Task;
 use super::stop::stopped_problem;
 use super::{Job, Keeper, Mode};
 use crate::order::{Answer, Answered, Choice, Letter, Order, Reply};
@@ -53,6 +54,9 @@ impl Keeper {
             Order::Abort { run } => self.abort_run(machine, &run, by).map(|()| Answer::Done),
             Order::Pause { run } => self.pause_run(machine, &run).map(|()| Answer::Done),
             Order::Resume { run } => self.resume_run(machine, &run).map(|()| Answer::Done),
+            Order::Answer { run, answer } => {
+                self.answer_run(&run, by, &answer).map(|()| Answer::Done)
+            }
             Order::Power { axis, on } => return self.power(machine, &axis, on, reply),
             Order::Calibration(choice) => return self.take_choice(choice, by, reply),
             Order::Reset => return self.take_reset(reply),
@@ -127,11 +131,11 @@ impl Keeper {
         let at = self.place(axis)?;
         self.require_free(at)?;
         let failed = |it: machine::Failure| Problem::from(truestage::Failure::from(it));
-        let mut moving = Moving::of(machine, axis).map_err(failed)?;
+        let mut driving = Driving::of(machine, axis).map_err(failed)?;
         if on {
-            moving.enable().map_err(failed)?;
+            driving.enable().map_err(failed)?;
         } else {
-            moving.disable();
+            driving.disable();
         }
         Ok(at)
     }
@@ -160,10 +164,11 @@ impl Keeper {
     /// Refuses an axis whose calibration cannot be chosen by itself, or is in use.
     pub(crate) fn require_own_calibration(&self, axis: &str) -> Result<(), Problem> {
         let at = self.place(axis)?;
-        if self.seats[at].moved_by == MovedBy::Itself {
+        let seat = &self.seats[at];
+        if seat.moved == Moved::Alone && seat.linear().is_some() {
             return self.require_free(at);
         }
-        let what = format!("axis {axis} is not calibrated by itself");
+        let what = format!("the calibration of axis {axis} is not chosen while the service runs");
         let help = "use `truestage cal` while the service is not running";
         Err(Problem::new(Code::NotOffered, what, help))
     }

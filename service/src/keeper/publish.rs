@@ -29,7 +29,7 @@ impl Keeper {
         let state = self.machine_state();
         let lease = self.holder(now).map(|it| (Arc::clone(&it.name), it.until));
         let motions = self.motions.list(&self.seats);
-        let runs = self.runs.list(&self.seats);
+        let runs = self.runs.list();
         let events = self.events.list();
         let figures = self.figures.look(machine);
         // What is there is of some earlier tick: everything is written over.

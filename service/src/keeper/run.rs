@@ -7,15 +7,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use machine::{Machine, Stage};
-use serde_json::{Value, json};
+use serde_json::json;
+use truestage::runs::{self, Found, Group};
 
-use super::seat::{MovedBy, Seat, Task as SeatTask};
-use super::stop::stopped_by;
+use super::mechanics::Mechanics;
+use super::seat::Task as SeatTask;
+use super::stop::{cause_of, stopped_by};
 use super::{Job, Keeper, Mode};
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::snapshot::CalibrationInUse;
-use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
+use crate::view::{Cause, RunState, RunView, Stopped, ToldView};
 
 /// So many runs are kept in the snapshot.
 const KEPT: usize = 64;
@@ -25,17 +27,35 @@ const KEPT: usize = 64;
 pub(crate) struct Task {
     pub(crate) id: Arc<str>,
     pub(crate) request: RunRequest,
-    /// The axis; `None` for all axes of a volume.
-    pub(crate) axis: Option<String>,
+    /// What it is for.
+    pub(crate) group: Arc<Group>,
+    /// Whether it goes on where it was left.
+    pub(crate) is_resumed: bool,
     /// The journal that it goes on with.
     pub(crate) resume: Option<PathBuf>,
 }
 
+impl Task {
+    /// What its procedure is to do.
+    pub(crate) fn of_procedure(&self) -> runs::Task {
+        runs::Task {
+            stage: self.request.kind.stage(),
+            resume: self.resume.clone(),
+            accept_drift: self.request.accept_drift,
+            uncompensated: self.request.uncompensated,
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
-struct Run {
-    task: Task,
+pub(super) struct Run {
+    pub(super) task: Task,
     axes: Vec<usize>,
-    view: RunView,
+    pub(super) view: RunView,
+    /// So many questions were asked.
+    pub(super) asked: u32,
+    /// The last that was answered, and how.
+    pub(super) answered: Option<(u32, String)>,
     /// Somebody stopped it; it ends so when its procedure has ended and its axes stand.
     stopped: Option<Stopped>,
     /// Somebody pauses it, likewise; a stop counts for more.
@@ -50,6 +70,8 @@ impl Run {
             task,
             axes,
             view,
+            asked: 0,
+            answered: None,
             stopped: None,
             is_pausing: false,
             is_over: false,
@@ -71,7 +93,7 @@ pub(super) struct Runs {
 
 impl Runs {
     /// The list for a snapshot, the same one until something changes.
-    pub(super) fn list(&mut self, _seats: &[Seat]) -> Arc<Vec<Arc<RunView>>> {
+    pub(super) fn list(&mut self) -> Arc<Vec<Arc<RunView>>> {
         let kept = &self.kept;
         let list = self.published.get_or_insert_with(|| {
             let views = kept.iter().map(|it| Arc::new(it.view.clone()));
@@ -96,13 +118,13 @@ impl Runs {
         self.published = None;
     }
 
-    fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
+    pub(super) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
         self.published = None;
         let found = self.kept.iter_mut().find(|it| *it.task.id == *id);
         found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
     }
 
-    fn under_way(&mut self) -> Option<&mut Run> {
+    pub(super) fn under_way(&mut self) -> Option<&mut Run> {
         self.published = None;
         let mut kept = self.kept.iter_mut();
         kept.find(|it| matches!(it.view.state, RunState::Running | RunState::Stopping))
@@ -117,55 +139,26 @@ impl Keeper {
         by: &str,
         request: &RunRequest,
     ) -> Result<(), Problem> {
-        let (axis, axes) = self.axes_of_run(request)?;
-        let plan = self.plan_of(request.kind, axes[0])?;
-        let names = axes.iter().map(|at| self.name(*at).to_string());
-        let view = RunView::planned(id, by, request.kind, names.collect(), plan);
-        self.events.push("run", id, json!(view));
+        let at = self.group_of(request.axis.as_deref())?;
+        let plan = self.plan_of(request.kind, at)?;
+        let grouped = &self.groups[at];
+        let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let task = Task {
             id: id.into(),
             request: request.clone(),
-            axis,
+            is_resumed: grouped.is_resumed(request.kind),
+            group,
             resume: None,
         };
+        task.group.refuse(&task.of_procedure())?;
+        let of = (task.group.name.as_str(), task.group.axes.clone());
+        let view = RunView {
+            can_resume: task.is_resumed,
+            ..RunView::planned(id, by, request.kind, of, plan)
+        };
+        self.events.push("run", id, json!(view));
         self.runs.keep(Run::new(task, axes, view));
         Ok(())
-    }
-
-    fn axes_of_run(&self, request: &RunRequest) -> Result<(Option<String>, Vec<usize>), Problem> {
-        let of_volume = |seat: &Seat| seat.moved_by == MovedBy::Volume;
-        if self.seats.iter().any(of_volume) && request.kind == RunKind::Zero {
-            let all = (0..self.seats.len()).filter(|at| of_volume(&self.seats[*at]));
-            return Ok((None, all.collect()));
-        }
-        let name = match (&request.axis, self.seats.as_slice()) {
-            (Some(axis), _) => axis.as_str(),
-            (None, [only]) => &only.name,
-            (None, _) => {
-                let what = "the machine has several axes";
-                return Err(Problem::new(Code::BadRequest, what, "name one in `axis`"));
-            }
-        };
-        let at = self.place(name)?;
-        if self.seats[at].moved_by != MovedBy::Itself {
-            let what = format!("axis {name} is not zeroed, calibrated or verified by itself");
-            let help = "use the verb of the command line";
-            return Err(Problem::new(Code::NotOffered, what, help));
-        }
-        Ok((Some(name.to_owned()), vec![at]))
-    }
-
-    fn plan_of(&self, kind: RunKind, at: usize) -> Result<RunPlanView, Problem> {
-        let plans = &self.seats[at].plans;
-        let (plan, section) = match kind {
-            RunKind::Zero => (&plans.zero, "zero"),
-            RunKind::Calibrate => (&plans.calibrate, "calibrate"),
-            RunKind::Verify => (&plans.verify, "verify"),
-        };
-        plan.clone().ok_or_else(|| {
-            let axis = self.name(at).to_string();
-            truestage::Failure::NotConfigured { axis, section }.into()
-        })
     }
 
     /// Begins the run `id` that was planned for that; one that cannot begin has failed.
@@ -253,6 +246,7 @@ impl Keeper {
             return;
         };
         run.view.state = RunState::Stopping;
+        run.view.question = None;
         // What has not begun is over.
         run.is_over |= is_waiting;
         let id = Arc::clone(&run.task.id);
@@ -311,24 +305,33 @@ impl Keeper {
         Some(task)
     }
 
-    /// The procedure of the run `id` has ended; says whether somebody stopped or paused it.
-    pub(crate) fn end_procedure(&mut self, id: &str) -> bool {
+    /// The procedure of the run `id` has ended.
+    pub(crate) fn end_procedure(&mut self, id: &str) {
         self.mode = Mode::Idle;
-        let Ok(run) = self.runs.find(id) else {
-            return false;
-        };
-        run.is_over = true;
-        run.is_to_end()
+        if let Ok(run) = self.runs.find(id) {
+            run.is_over = true;
+            run.view.question = None;
+        }
+    }
+
+    /// The procedure of the run `id` has ended before its result, because somebody stopped or paused it, or the person
+    /// who was asked did: its axes stand soon, also those that were moved together.
+    pub(crate) fn run_interrupted(&mut self, machine: &mut Machine, id: &str) {
+        if let Ok(run) = self.runs.find(id) {
+            run.is_pausing |= run.stopped.is_none();
+        }
+        self.slow_down_run(machine);
     }
 
     /// The run `id` has its result.
-    pub(crate) fn run_done(&mut self, id: &str, result: Value, told: Option<ToldView>) {
+    pub(crate) fn run_done(&mut self, id: &str, found: Found) {
         self.free_axes_of(id);
         self.change_run(id, |view| {
             view.state = RunState::Done;
             view.steps_done = view.steps;
-            view.result = result;
-            view.told = told;
+            view.result = found.figures;
+            view.told = found.told.map(ToldView::from);
+            view.out_of_tolerance = found.bad.as_ref().map(cause_of);
         });
     }
 
@@ -342,6 +345,7 @@ impl Keeper {
         self.free_axes_of(id);
         self.change_run(id, |view| {
             view.state = RunState::Failed;
+            view.question = None;
             view.cause = Some(cause.clone());
         });
     }
@@ -383,14 +387,14 @@ impl Keeper {
     }
 
     /// What corrects the moves of the axis at `name` from now on.
-    pub(crate) fn set_course(
+    pub(crate) fn set_mechanics(
         &mut self,
         name: &str,
-        course: truestage::linear::Course,
+        mechanics: Mechanics,
         calibration: Option<CalibrationInUse>,
     ) {
         if let Some(seat) = self.seats.iter_mut().find(|it| *it.name == *name) {
-            seat.course = course;
+            seat.mechanics = mechanics;
             seat.calibration = calibration.map(Arc::new);
         }
     }

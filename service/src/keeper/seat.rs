@@ -5,24 +5,16 @@ use std::sync::Arc;
 
 use machine::{AxisSettings, Machine};
 use truestage::linear::Course;
-use units::{Approach, Metres, Time};
+use truestage::runs::Moved;
+use units::Time;
 use wire::cia402::PowerState;
 
+use super::mechanics::Mechanics;
+use crate::coordinate::Coordinate;
 use crate::order::Reply;
 use crate::request::RunKind;
 use crate::snapshot::{AxisSample, CalibrationInUse};
-use crate::view::{AxisState, Cause, RunPlanView};
-
-/// Who may move an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MovedBy {
-    /// Anybody, by itself.
-    Itself,
-    /// Three axes are corrected together: by itself only uncorrected.
-    Volume,
-    /// The platform that it carries: never by itself.
-    Platform,
-}
+use crate::view::{AxisState, Cause};
 
 /// What an axis is in use for.
 #[derive(Debug)]
@@ -40,29 +32,22 @@ pub(super) enum Task {
     Stopping,
 }
 
-/// What its runs would do.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Plans {
-    pub(super) zero: Option<RunPlanView>,
-    pub(super) calibrate: Option<RunPlanView>,
-    pub(super) verify: Option<RunPlanView>,
-}
-
 /// An axis.
 pub(crate) struct Seat {
     pub(super) name: Arc<str>,
-    pub(super) moved_by: MovedBy,
-    pub(super) settings: AxisSettings,
+    /// How it is moved outside of runs.
+    pub(super) moved: Moved,
+    pub(super) mechanics: Mechanics,
+    /// The longest that one move may take.
+    pub(super) move_timeout: Duration,
     /// How long it must have been in position.
     pub(super) in_position: Duration,
-    pub(super) course: Course,
     pub(super) calibration: Option<Arc<CalibrationInUse>>,
-    pub(super) plans: Plans,
     pub(super) task: Task,
     pub(super) standing_since: Option<Time>,
-    pub(super) target: Option<Metres>,
-    pub(super) set_point: Option<Metres>,
-    pub(super) standard_uncertainty: Option<Metres>,
+    pub(super) target: Option<Coordinate>,
+    pub(super) set_point: Option<Coordinate>,
+    pub(super) standard_uncertainty: Option<Coordinate>,
     pub(super) last_cause: Option<Arc<Cause>>,
     pub(super) state: AxisState,
 }
@@ -95,15 +80,15 @@ impl Seat {
 
     /// Takes note of whether it stands.
     pub(super) fn watch_rest(&mut self, machine: &Machine) {
-        let Ok(Some(reading)) = machine.reading(&self.name) else {
+        let Some(sampled) = self.mechanics.sampled(machine, &self.name) else {
             return;
         };
-        match (reading.standing, self.standing_since) {
+        match (sampled.standing, self.standing_since) {
             (false, _) => {
                 self.standing_since = None;
                 self.standard_uncertainty = None;
             }
-            (true, None) => self.standing_since = Some(reading.at),
+            (true, None) => self.standing_since = Some(sampled.at),
             (true, Some(_)) => {}
         }
     }
@@ -114,12 +99,12 @@ impl Seat {
         since.is_some_and(|since| now.since(since) >= self.in_position)
     }
 
-    /// From which side it came to where it is.
-    pub(super) fn approach(&self, machine: &Machine) -> Approach {
-        let tracker = machine.approach(&self.name).ok();
-        tracker
-            .and_then(|it| it.approach())
-            .unwrap_or(Approach::Forward)
+    /// Within which it is moved, and what corrects that, where it goes along a way.
+    pub(super) fn linear(&self) -> Option<(&AxisSettings, &Course)> {
+        match &self.mechanics {
+            Mechanics::Linear(it) => Some((&it.settings, &it.course)),
+            Mechanics::Turning(_) => None,
+        }
     }
 
     /// What it does.
@@ -147,12 +132,12 @@ impl Seat {
 
     /// What is published of it.
     pub(super) fn sample(&self, machine: &Machine) -> AxisSample {
-        let reading = machine.reading(&self.name).ok().flatten();
-        let encoder = reading.map(|it| it.position);
+        let sampled = self.mechanics.sampled(machine, &self.name);
+        let encoder = sampled.map(|it| it.position);
         let homed = machine.is_zeroed(&self.name);
         let place = encoder
             .filter(|_| homed)
-            .and_then(|it| self.course.place(it, self.approach(machine)));
+            .and_then(|it| self.mechanics.place(machine, &self.name, it));
         AxisSample {
             state: self.state,
             encoder,

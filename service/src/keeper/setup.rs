@@ -1,61 +1,68 @@
 //! What is known of a machine before it is started.
 
-use core::time::Duration;
+use std::collections::BTreeMap;
 
 use machine::Stage;
-use truestage::linear::Course;
+use truestage::runs::{Group, Moved, Planned, Travel};
 use truestage::{Failure, Machine};
 
 use super::events::utc_now;
-use super::seat::{MovedBy, Plans, Seat, Task};
+use super::mechanics::Mechanics;
+use super::seat::{Seat, Task};
+use crate::problem::Problem;
 use crate::quantity::Quantity;
+use crate::request::RunKind;
 use crate::snapshot::{Fixed, FixedAxis};
 use crate::view::{AxisState, RunPlanView};
 
 /// What never changes of `machine`.
-pub(crate) fn fixed(machine: &Machine) -> Result<Fixed, Failure> {
-    let axes = machine.devices().axis_names().into_iter().map(|name| {
-        let (soft_min, soft_max) = machine.soft_limits(&name)?;
+pub(crate) fn fixed(machine: &mut Machine, groups: &[Group]) -> Result<Fixed, Failure> {
+    let names = names(machine).into_iter();
+    let axes = names.map(|name| {
+        let soft_limits = Mechanics::of(machine, &name)?.soft_limits();
+        let group = group_of(groups, &name).map_or_else(|| name.clone(), |it| it.name.clone());
         Ok(FixedAxis {
             name,
-            soft_min,
-            soft_max,
+            group,
+            soft_limits,
         })
     });
+    let axes = axes.collect::<Result<_, Failure>>()?;
     let section = &machine.config().machine;
     Ok(Fixed {
         name: section.name.clone(),
         stage_serial: section.stage_serial.clone(),
         config_hash: machine.config_hash().as_str().to_owned(),
         started: utc_now(),
-        axes: axes.collect::<Result<_, Failure>>()?,
+        axes,
     })
 }
 
-/// The linear axes of `machine`, which nobody has yet.
-pub(crate) fn seats(machine: &mut Machine) -> Result<Vec<Seat>, Failure> {
-    let names = machine.devices().axis_names();
-    names.iter().map(|name| seat(machine, name)).collect()
+/// The axes of `machine`.
+fn names(machine: &Machine) -> Vec<String> {
+    let devices = machine.devices();
+    [devices.axis_names(), devices.rotary_names()].concat()
 }
 
-fn seat(machine: &mut Machine, name: &str) -> Result<Seat, Failure> {
-    let config = machine.config();
-    let moved_by = match (&config.platform, &config.volumetric) {
-        (Some(_), _) => MovedBy::Platform,
-        (None, Some(volume)) if volume.axes.iter().any(|it| it == name) => MovedBy::Volume,
-        (None, _) => MovedBy::Itself,
-    };
-    let motion = &config.axis[name].motion;
-    let in_position = Duration::from_millis(motion.position_window_time_ms.into());
-    let settings = *machine.axis_settings(name)?;
+fn group_of<'g>(groups: &'g [Group], axis: &str) -> Option<&'g Group> {
+    let mut groups = groups.iter();
+    groups.find(|it| it.axes.iter().any(|it| it == axis))
+}
+
+/// The axes of `machine`, of these `groups`, which nobody has yet.
+pub(crate) fn seats(machine: &mut Machine, groups: &[Group]) -> Result<Vec<Seat>, Failure> {
+    let names = names(machine);
+    names.iter().map(|it| seat(machine, groups, it)).collect()
+}
+
+fn seat(machine: &mut Machine, groups: &[Group], name: &str) -> Result<Seat, Failure> {
     Ok(Seat {
         name: name.into(),
-        moved_by,
-        settings,
-        in_position,
-        course: Course::default(),
+        moved: group_of(groups, name).map_or(Moved::Alone, |it| it.moved),
+        mechanics: Mechanics::of(machine, name)?,
+        move_timeout: Mechanics::move_timeout(machine, name),
+        in_position: Mechanics::in_position(machine, name),
         calibration: None,
-        plans: plans(machine, name, moved_by)?,
         task: Task::Free,
         standing_since: None,
         target: None,
@@ -66,27 +73,35 @@ fn seat(machine: &mut Machine, name: &str) -> Result<Seat, Failure> {
     })
 }
 
-fn plans(machine: &mut Machine, name: &str, moved_by: MovedBy) -> Result<Plans, Failure> {
-    let zero = RunPlanView::default();
-    let stage = machine.linear(name)?;
-    let measured = |of| {
-        stage.planned(of).map(|it| RunPlanView {
-            points: it.points,
-            travel: Some(Quantity::mm(it.travel)),
-            seconds_at_least: it.at_least.as_secs_f64(),
-            asks: Vec::new(),
-        })
-    };
-    Ok(match moved_by {
-        MovedBy::Platform => Plans::default(),
-        MovedBy::Volume => Plans {
-            zero: Some(zero),
-            ..Plans::default()
-        },
-        MovedBy::Itself => Plans {
-            zero: stage.config().zero.as_ref().map(|_| zero),
-            calibrate: measured(Stage::Calibrate),
-            verify: measured(Stage::Verify),
-        },
-    })
+/// What the runs of a group would do, or why they cannot be; one that its kind does not have is not there.
+pub(crate) type Plans = BTreeMap<RunKind, Result<RunPlanView, Problem>>;
+
+/// What the runs of `group` would do now.
+pub(crate) fn plans(machine: &mut Machine, group: &Group) -> Plans {
+    let offered = |it: &RunKind| group.offered().contains(&it.stage());
+    let kinds = RunKind::ALL.into_iter().filter(offered);
+    let plans = kinds.map(|kind| {
+        let planned = group.planned(machine, kind.stage());
+        (kind, planned.map(shown).map_err(Problem::from))
+    });
+    plans.collect()
+}
+
+fn shown(planned: Planned) -> RunPlanView {
+    RunPlanView {
+        points: planned.points,
+        travel: planned.travel.map(|it| match it {
+            Travel::Length(it) => Quantity::mm(it),
+            Travel::Angle(it) => Quantity::deg(it),
+        }),
+        seconds_at_least: planned.at_least.as_secs_f64(),
+        asks: planned.asks,
+    }
+}
+
+/// Which of the runs of `group` go on where they were left.
+pub(crate) fn resumed(machine: &Machine, group: &Group) -> Vec<Stage> {
+    let offered = group.offered().iter().copied();
+    let resumed = offered.filter(|it| group.is_resumed(machine.config(), *it));
+    resumed.collect()
 }

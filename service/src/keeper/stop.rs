@@ -2,7 +2,7 @@
 
 use core::mem;
 
-use machine::{Failure, Machine, Moving};
+use machine::{Driving, Failure, Machine};
 use serde_json::json;
 
 use super::seat::Task;
@@ -31,8 +31,8 @@ impl Keeper {
 
     fn quick_stop(&mut self, machine: &mut Machine, at: usize) {
         let seat = &mut self.seats[at];
-        if let Ok(mut moving) = Moving::of(machine, &seat.name) {
-            moving.quick_stop();
+        if let Ok(mut driving) = Driving::of(machine, &seat.name) {
+            driving.quick_stop();
             let before = mem::replace(&mut seat.task, Task::Stopping);
             if let Task::Power(Some(reply)) = before {
                 self.answers.push((reply, Err(stopped_problem())));
@@ -43,8 +43,9 @@ impl Keeper {
     /// Slows the axis down; it is `Stopping` until it stands.
     pub(super) fn halt(&mut self, machine: &mut Machine, at: usize) {
         let seat = &mut self.seats[at];
-        if let Ok(mut moving) = Moving::of(machine, &seat.name) {
-            moving.halt();
+        if let Ok(mut driving) = Driving::of(machine, &seat.name)
+            && driving.halt()
+        {
             seat.task = Task::Stopping;
         }
     }
@@ -70,7 +71,7 @@ impl Keeper {
             let (Task::Stopping | Task::Power(_)) = seat.task else {
                 continue;
             };
-            let Some(outcome) = machine.outcome(&seat.name)? else {
+            let Some(outcome) = Driving::of(machine, &seat.name)?.outcome() else {
                 continue;
             };
             match mem::replace(&mut seat.task, Task::Free) {

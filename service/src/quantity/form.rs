@@ -8,7 +8,8 @@ use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, OneOfBuilder,
 use utoipa::openapi::{KnownFormat, Ref, RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::{Length, Speed, Written};
+use super::{Speed, Written};
+use crate::coordinate::Coordinate;
 
 /// So many digits may stand before and behind the point, and in the exponent: enough for any double, and never
 /// too much for one.
@@ -113,7 +114,7 @@ pub(crate) fn targets() -> Schema {
         .description(Some(
             "Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time",
         ))
-        .additional_properties(Some(Ref::from_schema_name(LengthIn::name())))
+        .additional_properties(Some(Ref::from_schema_name(PlaceIn::name())))
         .min_properties(Some(1))
         .examples([json!({"x": "12.5mm"})])
         .build()
@@ -141,9 +142,9 @@ macro_rules! described {
 }
 
 described!(
-    /// A [`Length`] in the description.
-    LengthIn,
-    described::<Length>("Length", "A length", &any_number(), false)
+    /// A [`Coordinate`] in the description.
+    PlaceIn,
+    described::<Coordinate>("Place", "A length, or an angle of an axis that turns", &any_number(), false)
 );
 described!(
     /// A [`Speed`] with its direction in the description.

@@ -87,7 +87,7 @@ fn a_speed_of_zero_ends_a_jog_and_the_other_way_begins_another_one() {
 #[test]
 fn a_jog_ends_at_the_soft_limit() {
     with_zeroed_stage(|bed| {
-        let limit = bed.client.axis("x").unwrap().soft_max.value;
+        let limit = bed.client.axis("x").unwrap().soft_max.unwrap().value;
         let near = bed.begin(&to("x", limit - 0.5));
         assert_eq!(bed.ended(&near).state, MotionState::Done);
         let id = bed.keeps_jogging(5.0, 0.5);

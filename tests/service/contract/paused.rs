@@ -30,7 +30,7 @@ impl Bed<'_> {
     }
 
     /// Waits until it is paused.
-    fn paused(&self, id: &str) -> RunView {
+    pub(super) fn paused(&self, id: &str) -> RunView {
         for _ in 0..1000 {
             let run = self.run_now(id);
             if run.state == RunState::Paused {

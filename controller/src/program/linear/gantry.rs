@@ -5,11 +5,12 @@ use units::{Metres, Radians};
 
 use crate::Failure;
 use crate::config::MachineConfig;
-use crate::linear::{GantryZeroed, RotationEntry, Told};
+use crate::linear::{GantryZeroed, RotationEntry};
 use crate::program::json as to_json;
 use crate::program::linear::told;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::Session;
+use crate::runs::Told;
 
 /// The gantry that is meant by `name`, or by none where the machine has nothing else to zero.
 pub(super) fn asked_for(config: &MachineConfig, name: Option<&str>) -> Option<String> {

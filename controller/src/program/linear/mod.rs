@@ -19,6 +19,7 @@ pub(crate) mod verbs;
 use machine::records::Log;
 
 use super::show::Shown;
+use super::targets::axis_motion;
 use super::text::table_notes;
 use super::verbs::Verbs;
 use crate::config::MachineConfig;
@@ -45,6 +46,9 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    motion: axis_motion,
+    asked: &[],
+    words: &told::TELLER,
     shown: &[Shown::of::<LinearContent>()],
     opened_by: LinearLog::OPENED_BY,
     page: page::html,

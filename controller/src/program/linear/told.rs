@@ -3,18 +3,17 @@
 use serde_json::{Value, json};
 use units::Short;
 
-use crate::linear::{Calibrated, Moved, Teller, Told, Verified, Zeroed};
+use crate::linear::{Calibrated, LinearTeller, Moved, Verified, Zeroed};
 use crate::program::linear::{moved as of_move, uncertainty};
 use crate::program::{json as to_json, text};
+use crate::runs::Told;
 
 /// For whoever keeps a machine.
-pub(crate) const TELLER: Teller = Teller {
+pub(crate) static TELLER: LinearTeller = LinearTeller {
     zeroed,
     calibrated,
     verified,
     moved,
-    counters: |machine| to_json::counters(&machine.devices().counters()),
-    page: super::page::html,
 };
 
 pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {

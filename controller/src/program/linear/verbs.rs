@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use units::Metres;
 
 use crate::linear::settings::require_within;
-use crate::linear::{Told, Verified, VerifyOptions};
+use crate::linear::{Verified, VerifyOptions};
 use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::linear::{gantry, moved, told};
@@ -17,6 +17,7 @@ use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_targets;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::run::CalibrateOptions;
+use crate::runs::Told;
 use crate::{Agreed, Failure, Machine};
 
 /// An axis of a machine that is connected, before anything moves.
@@ -141,13 +142,8 @@ fn verified_by(
 
 /// What was verified as left, and whether it is within the tolerance.
 fn judged(axis: &str, verified: &Verified, told: Told, counters: Value, output: Output) -> Ended {
-    if verified.is_within_tolerance() {
+    let Some(failure) = verified.out_of_tolerance(axis) else {
         return output.told(told, counters);
-    }
-    let failure = Failure::OutOfTolerance {
-        axis: axis.to_owned(),
-        seen: verified.figures.accuracy.bidirectional,
-        limit: verified.tolerance,
     };
     output.bad_result(&told.text, with_counters(told.value, counters), failure)
 }

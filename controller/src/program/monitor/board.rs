@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::feed::Heard;
 use super::words;
@@ -87,6 +87,13 @@ impl Board {
                 run["id"] = event["of"].clone();
             }
             self.run(run);
+        }
+        if event["kind"] == "question" {
+            let question = match event["data"]["answer"].is_null() {
+                true => event["data"].clone(),
+                false => Value::Null,
+            };
+            self.run(json!({"id": event["of"], "question": question}));
         }
         self.events.push_front(words::line(event));
         self.events.truncate(EVENTS_KEPT);

@@ -131,17 +131,23 @@ fn draw_axes(frame: &mut Frame<'_>, area: Rect, board: &Board, looks: Looks) {
 }
 
 fn axis_row(axis: &Value, looks: Looks) -> Row<'static> {
-    let number = |value: Option<f64>, digits: usize| {
-        let shown = value.map_or_else(|| "-".to_owned(), |it| format!("{it:.digits$}"));
+    // Of an axis that turns, in degrees and arcseconds.
+    let turns = axis["encoder"]["unit"] == "deg";
+    let (small, [whole, part]) = match turns {
+        true => (3600.0, ["°", "″"]),
+        false => (1e3, ["", ""]),
+    };
+    let number = |value: Option<f64>, digits: usize, unit: &str| {
+        let shown = value.map_or_else(|| "-".to_owned(), |it| format!("{it:.digits$}{unit}"));
         Cell::from(Line::raw(shown).right_aligned())
     };
     let of = |name: &str| axis[name]["value"].as_f64();
     let (position, encoder) = (of("position"), of("encoder"));
     let corrected = axis["corrected"] == true;
-    let correction_um = position
+    let correction = position
         .zip(encoder)
         .filter(|_| corrected)
-        .map(|(point, drive)| (point - drive) * 1e3);
+        .map(|(point, drive)| (point - drive) * small);
     let state = text(&axis["state"]);
     let looks_of_state = match state.as_str() {
         "ErrorStop" => looks.bad,
@@ -155,10 +161,10 @@ fn axis_row(axis: &Value, looks: Looks) -> Row<'static> {
     Row::new([
         Cell::from(text(&axis["name"])),
         Cell::from(state).style(looks_of_state),
-        number(position.or(encoder), 6),
-        number(of("standard_uncertainty").map(|it| 2.0 * it), 3),
-        number(correction_um, 3),
-        number(of("target"), 6),
+        number(position.or(encoder), 6, whole),
+        number(of("standard_uncertainty").map(|it| 2.0 * it), 3, part),
+        number(correction, 3, part),
+        number(of("target"), 6, whole),
         user,
     ])
 }
@@ -182,7 +188,9 @@ fn run_line(run: &Value, looks: Looks) -> Line<'static> {
         "running" => looks.good,
         _ => Style::new(),
     };
+    let asks = run["question"]["text"].as_str();
     let detail = match (state.as_str(), run["steps"].as_u64().unwrap_or_default()) {
+        ("running", _) if asks.is_some() => format!("ASKS: {}", one_line(asks.unwrap_or_default())),
         ("running", steps) if steps > 0 => bar(
             run["steps_done"].as_u64().unwrap_or_default(),
             steps,

@@ -21,7 +21,7 @@ use crate::program::output::Output;
 use crate::program::platform::report as page;
 use crate::program::platform::report::PlatformPage;
 use crate::program::platform::verbs::{
-    calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
+    calibrated_text, calibrated_value, verified_text, verified_value,
 };
 use machine::records::Store;
 
@@ -90,7 +90,7 @@ fn show(stand: &mut Stand, args: &DemoArgs, output: Output) -> Result<Shown, Fai
             "report": report,
             "wall_s": wall.as_secs_f64(),
         }),
-        bad: bad.map(out_of_tolerance),
+        bad: bad.and_then(|it| it.out_of_tolerance()),
     })
 }
 

@@ -9,6 +9,7 @@ mod report;
 #[cfg(test)]
 mod stored_tests;
 mod target;
+mod told;
 pub(crate) mod verbs;
 
 use std::path::Path;
@@ -36,6 +37,9 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    motion: target::motion,
+    asked: &[],
+    words: &told::TELLER,
     shown: &[Shown::of::<ScrewContent>()],
     opened_by: PlatformLog::OPENED_BY,
     page: html,

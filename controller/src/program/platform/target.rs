@@ -5,6 +5,8 @@ use units::{Metres, Radians};
 
 use crate::Failure;
 use crate::platform::Pose;
+use crate::program::MoveArgs;
+use crate::program::targets::AskedMotion;
 
 /// A pose of which not every part need be named.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +66,15 @@ impl NamedPose {
             angle: self.angle.unwrap_or(here.angle),
         }
     }
+}
+
+/// The same as a service is asked for it.
+pub(super) fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
+    NamedPose::parse(&args.targets)?;
+    Err(Failure::Usage {
+        what: "a service keeps this machine, and does not move platforms".into(),
+        help: "end the service first; then this verb moves it".into(),
+    })
 }
 
 #[cfg(test)]

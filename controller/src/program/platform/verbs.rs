@@ -4,15 +4,17 @@ use serde_json::{Value, json};
 
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::{Aligned, PlatformVerified};
-use crate::platform::{PlatformFailure, Pose, PoseMoved};
+use crate::platform::zero::PlatformZeroed;
+use crate::platform::{Pose, PoseMoved};
 use crate::ports::Use;
 use crate::program::json as to_json;
-use crate::program::output::{Ended, Output};
+use crate::program::output::{Ended, Output, with_counters};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::platform::target::NamedPose;
 use crate::program::session::Session;
 use crate::program::text::verdict;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
+use crate::runs::Told;
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -51,19 +53,23 @@ fn zeroed_platform<P, R>(
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let mut session = Session::open(&args.machine, "zero", Use::Measurement, output)?;
     let store = session.store.clone();
-    let zeroed = session.machine.guarded(|machine| {
+    let (found, counters) = session.machine.guarded(|machine| {
         machine.start()?;
         let zeroed = machine.platform()?.zero(&store)?;
         machine.shut_down()?;
-        Ok(zeroed)
+        Ok((zeroed, to_json::counters(&machine.devices().counters())))
     })?;
+    output.told(zeroed(&found), counters)
+}
+
+pub(super) fn zeroed(zeroed: &PlatformZeroed) -> Told {
     let text = format!(
         "platform: zero found; the camera sees it at {}\nrecorded in {}",
         pose_text(zeroed.datum),
         zeroed.journal.display()
     );
     let value = json!({"datum": pose_value(zeroed.datum), "journal": zeroed.journal});
-    output.result(&text, &value)
+    Told { text, value }
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
@@ -84,14 +90,21 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
         machine.platform()?.verify(store, compensated)
     };
     let (verified, counters) = with_zeroed_platform(&args.axis.machine, "verify", output, run)?;
-    let title = if compensated { "as left" } else { "as found" };
-    let mut value = json!({title.replace(' ', "_"): verified_value(&verified)});
-    value["counters"] = counters;
-    let text = verified_text(title, &verified);
-    if compensated && !verified.is_within_tolerance() {
-        return output.bad_result(&text, value, out_of_tolerance(&verified));
+    let told = verified_as(&verified, compensated);
+    match verified.out_of_tolerance().filter(|_| compensated) {
+        None => output.told(told, counters),
+        Some(failure) => {
+            output.bad_result(&told.text, with_counters(told.value, counters), failure)
+        }
     }
-    output.result(&text, &value)
+}
+
+pub(super) fn verified_as(verified: &PlatformVerified, compensated: bool) -> Told {
+    let title = if compensated { "as left" } else { "as found" };
+    Told {
+        text: verified_text(title, verified),
+        value: json!({title.replace(' ', "_"): verified_value(verified)}),
+    }
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
@@ -354,11 +367,6 @@ pub(crate) fn verified_value(verified: &PlatformVerified) -> Value {
         "poses": poses,
         "journal": verified.journal,
     })
-}
-
-pub(crate) fn out_of_tolerance(verified: &PlatformVerified) -> Failure {
-    let (seen, limit) = (verified.largest, verified.tolerance);
-    PlatformFailure::OutOfTolerance { seen, limit }.into()
 }
 
 fn pose_text(pose: Pose) -> String {

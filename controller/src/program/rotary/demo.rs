@@ -16,12 +16,12 @@ use crate::program::demo::stand::{
 use crate::program::made_from::made_from;
 use crate::program::output::Output;
 use crate::program::rotary::report as page;
+use crate::program::rotary::told::moved;
 use crate::program::rotary::told::{
-    calibrated_text, calibrated_value, out_of_tolerance, verified_text, verified_value,
+    calibrated_text, calibrated_value, verified_text, verified_value,
 };
-use crate::program::rotary::verbs::{moved_text, moved_value};
+use crate::rotary::RotaryMoved;
 use crate::rotary::Way;
-use crate::rotary::moves::RotaryMoved;
 use crate::rotary::{Operator, PlateTask, RotaryCalibrated, RotaryVerified};
 use crate::run::CalibrateOptions;
 use machine::records::Store;
@@ -72,7 +72,7 @@ fn show(stand: &mut Stand, _: &DemoArgs, output: Output) -> Result<Shown, Failur
     let report = write_report(&stand.store, &story)?;
     let wall = stand.started.elapsed();
     let bad = [&story.left, &story.after];
-    let bad = bad.into_iter().find_map(|it| out_of_tolerance(AXIS, it));
+    let bad = bad.into_iter().find_map(|it| it.out_of_tolerance(AXIS));
     let id = Some(story.calibrated.id.as_str());
     Ok(Shown {
         text: [
@@ -83,7 +83,7 @@ fn show(stand: &mut Stand, _: &DemoArgs, output: Output) -> Result<Shown, Failur
             "after a power cycle:".to_owned(),
             verified_text(&story.after),
             String::new(),
-            moved_text(AXIS, &story.moved, id),
+            moved(AXIS, &story.moved, id).text,
             String::new(),
             format!("report       {}", report.display()),
             took(wall, stand.machine.now()),
@@ -94,7 +94,7 @@ fn show(stand: &mut Stand, _: &DemoArgs, output: Output) -> Result<Shown, Failur
             "calibration": calibrated_value(&story.calibrated),
             "verified": verified_value(&story.left),
             "verified_after_power_cycle": verified_value(&story.after),
-            "move": moved_value(AXIS, &story.moved, id),
+            "move": moved(AXIS, &story.moved, id).value,
             "report": report,
             "wall_s": wall.as_secs_f64(),
         }),

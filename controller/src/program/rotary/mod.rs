@@ -1,5 +1,6 @@
 //! Rotary tables on the command line.
 
+mod asked;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
@@ -43,6 +44,9 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    motion: targets::motion,
+    asked: asked::ASKED,
+    words: &told::TELLER,
     shown: &[Shown::of::<RotaryContent>()],
     opened_by: PlateLog::OPENED_BY,
     page: html,

@@ -1,9 +1,11 @@
 //! Where rotary axes are told to go, as a person types it, and which place that is.
 
+use serde_json::{Map, Value, json};
 use units::text::angle;
 use units::{Radians, Short};
 
 use crate::Failure;
+use crate::program::targets::AskedMotion;
 use crate::program::{MoveArgs, WayName};
 use crate::rotary::Way;
 
@@ -25,6 +27,30 @@ pub(super) const fn named_way(args: &MoveArgs) -> Way {
         Some(WayName::Reverse) => Way::Reverse,
         Some(WayName::Turns) => Way::Turns,
     }
+}
+
+/// The same as a service is asked for it.
+pub(super) fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
+    let way = named_way(args);
+    let targets = targets(args)?;
+    let notes = targets.iter().filter_map(|(axis, angle)| {
+        let note = turns_left_out(*angle, way)?;
+        Some((axis.clone(), format!("axis {axis}: {note}")))
+    });
+    let notes = notes.collect();
+    let targets = targets.into_iter();
+    let targets = targets.map(|(axis, it)| (axis, json!({"value": it.value(), "unit": "rad"})));
+    let targets: Map<String, Value> = targets.collect();
+    let way = match way {
+        Way::Shortest => "shortest",
+        Way::Forward => "forward",
+        Way::Reverse => "reverse",
+        Way::Turns => "turns",
+    };
+    Ok(AskedMotion {
+        request: json!({"targets": targets, "way": way}),
+        notes,
+    })
 }
 
 /// `c=90deg`: the unit is never guessed.

@@ -3,12 +3,52 @@
 use machine::records::short;
 use serde_json::{Value, json};
 
-use crate::Failure;
 use crate::program::output::{Ended, Output};
 use crate::program::rotary::json::{arcsec, solution};
 use crate::program::text::verdict;
 use crate::rotary::verify::RotaryFigures;
-use crate::rotary::{RotaryCalibrated, RotaryFailure, RotaryVerified};
+use crate::rotary::{RotaryCalibrated, RotaryMoved, RotaryTeller, RotaryVerified};
+use crate::runs::Told;
+
+/// For whoever keeps a machine.
+pub(crate) static TELLER: RotaryTeller = RotaryTeller {
+    zeroed,
+    calibrated,
+    verified: told_verified,
+    moved,
+};
+
+pub(crate) fn moved(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> Told {
+    Told {
+        text: moved_text(axis, moved, calibration),
+        value: moved_value(axis, moved, calibration),
+    }
+}
+
+pub(crate) fn zeroed(axis: &str) -> Told {
+    Told {
+        text: format!("axis {axis}: zero found on the index mark"),
+        value: json!({"axis": axis}),
+    }
+}
+
+pub(crate) fn calibrated(axis: &str, calibrated: &RotaryCalibrated) -> Told {
+    let mut value = calibrated_value(calibrated);
+    value["axis"] = json!(axis);
+    Told {
+        text: calibrated_text(calibrated),
+        value,
+    }
+}
+
+fn told_verified(axis: &str, verified: &RotaryVerified) -> Told {
+    let mut value = verified_value(verified);
+    value["axis"] = json!(axis);
+    Told {
+        text: verified_text(verified),
+        value,
+    }
+}
 
 /// How a verification ended; `counters` of a machine that was there.
 pub(crate) fn verified(
@@ -17,27 +57,14 @@ pub(crate) fn verified(
     counters: Value,
     output: Output,
 ) -> Ended {
-    let mut value = verified_value(verified);
-    value["axis"] = json!(axis);
+    let Told { text, mut value } = told_verified(axis, verified);
     if !counters.is_null() {
         value["counters"] = counters;
     }
-    let text = verified_text(verified);
-    match out_of_tolerance(axis, verified) {
+    match verified.out_of_tolerance(axis) {
         Some(failure) => output.bad_result(&text, value, failure),
         None => output.result(&text, &value),
     }
-}
-
-/// What a verification that was to be within the tolerance failed by.
-pub(crate) fn out_of_tolerance(axis: &str, verified: &RotaryVerified) -> Option<Failure> {
-    let left = verified.left.as_ref()?;
-    let failure = RotaryFailure::OutOfTolerance {
-        axis: axis.to_owned(),
-        seen: left.largest,
-        limit: verified.tolerance,
-    };
-    (!verified.is_within_tolerance()).then(|| failure.into())
 }
 
 pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
@@ -151,5 +178,41 @@ pub(crate) fn verified_value(verified: &RotaryVerified) -> Value {
         "tolerance_arcsec": arcsec(verified.tolerance),
         "within_tolerance": verified.left.is_some().then(|| verified.is_within_tolerance()),
         "journal": verified.journal,
+    })
+}
+
+fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
+    let by = calibration.map_or("not corrected".to_owned(), short);
+    let u = moved
+        .standard_uncertainty
+        .map_or(String::new(), |u| format!(", u = {:.4}″", u.arcsec()));
+    format!(
+        "axis {axis}: target {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
+        moved.target.degrees(),
+        moved.set_point.degrees(),
+        moved.expected.degrees(),
+        uncorrected(axis, calibration)
+    )
+}
+
+/// A table without a calibration goes by its encoder alone.
+fn uncorrected(axis: &str, calibration: Option<&str>) -> String {
+    if calibration.is_some() {
+        return String::new();
+    }
+    format!(
+        "\naxis {axis}: NOT CORRECTED: the axis went by its encoder alone, and is off by the deviation of that there"
+    )
+}
+
+fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> Value {
+    json!({
+        "axis": axis,
+        "target_deg": moved.target.degrees(),
+        "set_point_deg": moved.set_point.degrees(),
+        "expected_deg": moved.expected.degrees(),
+        "standard_uncertainty_arcsec": moved.standard_uncertainty.map(arcsec),
+        "calibration": calibration,
+        "corrected": calibration.is_some(),
     })
 }

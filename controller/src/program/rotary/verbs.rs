@@ -1,6 +1,5 @@
 //! The verbs of the cycle on rotary axes (system S2).
 
-use machine::records::short;
 use serde_json::{Value, json};
 
 use crate::ports::Use;
@@ -8,22 +7,19 @@ use crate::program::json as to_json;
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
-use crate::program::rotary::json::arcsec;
 use crate::program::rotary::readings::{self, ReadBy};
 use crate::program::rotary::targets::{named_way, targets, turns_left_out};
-use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
+use crate::program::rotary::told::{self, verified, zeroed};
 use crate::program::session::{Session, choose_axis};
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
-use crate::rotary::moves::RotaryMoved;
 use crate::run::CalibrateOptions;
-use crate::{Failure, Machine};
+use crate::{Agreed, Failure, Machine};
 use machine::records::Store;
 
 pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let run = |_: &mut Machine, _: &str, _: &Store| Ok(());
     let (axis, (), counters) = with_zeroed_table(args, "zero", Use::Motion, output, run)?;
-    let text = format!("axis {axis}: zero found on the index mark");
-    output.result(&text, &json!({"axis": axis, "counters": counters}))
+    output.told(zeroed(&axis), counters)
 }
 
 /// Starts the machine, zeroes the axis, runs `procedure`, switches off.
@@ -82,10 +78,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let (axis, calibrated, counters) =
         with_zeroed_table(&args.axis, "calibrate", Use::Measurement, output, run)?;
-    let mut value = calibrated_value(&calibrated);
-    value["axis"] = json!(axis);
-    value["counters"] = counters;
-    output.result(&calibrated_text(&calibrated), &value)
+    output.told(told::calibrated(&axis, &calibrated), counters)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
@@ -130,12 +123,12 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let (targets, way) = (targets(args)?, named_way(args));
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let store = session.store.clone();
-    let uncompensated = args.agreed.uncompensated;
+    let agreed = args.agreed.agreed();
     let moved = session.machine.guarded(|machine| {
         machine.start()?;
         let mut calibrations = Vec::new();
         for (axis, _) in &targets {
-            calibrations.push(calibration_of(machine, axis, uncompensated, &store)?);
+            calibrations.push(calibration_of(machine, axis, agreed, &store)?);
         }
         let mut moved = Vec::new();
         for ((axis, angle), calibration) in targets.iter().zip(calibrations) {
@@ -152,12 +145,12 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
             let note = note
                 .as_ref()
                 .map_or(String::new(), |it| format!("\naxis {axis}: {it}"));
-            moved_text(axis, moved, calibration.as_deref()) + &note
+            told::moved(axis, moved, calibration.as_deref()).text + &note
         })
         .collect();
     let values: Vec<_> = moved
         .iter()
-        .map(|(axis, moved, calibration, _)| moved_value(axis, moved, calibration.as_deref()))
+        .map(|(axis, moved, calibration, _)| told::moved(axis, moved, calibration.as_deref()).value)
         .collect();
     output.result(&lines.join("\n"), &json!({"moves": values}))
 }
@@ -167,48 +160,13 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
 fn calibration_of(
     machine: &mut Machine,
     axis: &str,
-    uncompensated: bool,
+    agreed: Agreed,
     store: &Store,
 ) -> Result<Option<String>, Failure> {
-    if uncompensated {
+    if agreed.uncompensated {
         return Ok(None);
     }
     let id = machine.rotary(axis)?.load_active(store)?;
-    id.map(Some).ok_or_else(|| Failure::not_calibrated(axis))
-}
-
-pub(crate) fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
-    let by = calibration.map_or("not corrected".to_owned(), short);
-    let u = moved
-        .standard_uncertainty
-        .map_or(String::new(), |u| format!(", u = {:.4}″", u.arcsec()));
-    format!(
-        "axis {axis}: target {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
-        moved.target.degrees(),
-        moved.set_point.degrees(),
-        moved.expected.degrees(),
-        uncorrected(axis, calibration)
-    )
-}
-
-/// A table without a calibration goes by its encoder alone.
-fn uncorrected(axis: &str, calibration: Option<&str>) -> String {
-    if calibration.is_some() {
-        return String::new();
-    }
-    format!(
-        "\naxis {axis}: NOT CORRECTED: the axis went by its encoder alone, and is off by the deviation of that there"
-    )
-}
-
-pub(crate) fn moved_value(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> Value {
-    json!({
-        "axis": axis,
-        "target_deg": moved.target.degrees(),
-        "set_point_deg": moved.set_point.degrees(),
-        "expected_deg": moved.expected.degrees(),
-        "standard_uncertainty_arcsec": moved.standard_uncertainty.map(arcsec),
-        "calibration": calibration,
-        "corrected": calibration.is_some(),
-    })
+    machine.rotary(axis)?.course().require(axis, agreed)?;
+    Ok(id)
 }

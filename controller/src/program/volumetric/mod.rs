@@ -1,5 +1,6 @@
 //! Three axes that are corrected throughout their volume, on the command line.
 
+mod asked;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
@@ -10,6 +11,7 @@ mod report;
 pub(crate) mod shown;
 #[cfg(test)]
 mod stored_tests;
+mod told;
 pub(crate) mod verbs;
 
 use std::path::Path;
@@ -19,6 +21,7 @@ use report::Made;
 
 use super::made_from::source;
 use super::show::Shown;
+use super::targets::axis_motion;
 use super::verbs::Verbs;
 use crate::Failure;
 use crate::config::MachineConfig;
@@ -38,6 +41,9 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    motion: axis_motion,
+    asked: asked::ASKED,
+    words: &told::TELLER,
     shown: &[
         Shown::of::<GeometryContent>(),
         Shown::of::<BeamReferencesContent>(),

@@ -10,6 +10,7 @@ use crate::config::MachineConfig;
 use crate::ports::Use;
 use crate::program::MachineArgs;
 use crate::program::data_file::{read, volume_head_of};
+use crate::program::kept::or_by_its_service;
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::reference_changes;
 use crate::program::volumetric::verbs::with_zeroed_volume;
@@ -47,7 +48,10 @@ struct ReferenceFile {
 pub(crate) fn run(args: &ReferenceArgs, output: Output) -> Ended {
     match &args.command {
         Some(ReferenceCommand::Import(file)) => import(file, output),
-        None => reference(&args.machine, output),
+        None => {
+            let here = reference(&args.machine, output);
+            or_by_its_service(here, |service| service.reference(&args.machine, output))
+        }
     }
 }
 
@@ -75,7 +79,7 @@ fn has_a_volume(config: &MachineConfig) -> Result<(), Failure> {
     })
 }
 
-fn referenced_text(taken: &VolumetricReferenced) -> String {
+pub(super) fn referenced_text(taken: &VolumetricReferenced) -> String {
     in_use_text(&taken.id, &taken.references.content)
 }
 
@@ -92,7 +96,7 @@ fn in_use_text(id: &str, content: &BeamReferencesContent) -> String {
     )
 }
 
-fn referenced_value(taken: &VolumetricReferenced) -> Value {
+pub(super) fn referenced_value(taken: &VolumetricReferenced) -> Value {
     let temperatures = taken.references.temperatures.iter();
     json!({
         "references": taken.id,

@@ -19,11 +19,10 @@ use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::text::verdict;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
+use crate::runs::Told;
 use crate::volumetric::UnknownRecord;
 use crate::volumetric::verify::VolumetricVerified;
-use crate::volumetric::{
-    GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, VolumetricFailure, WarmUp,
-};
+use crate::volumetric::{GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, WarmUp};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -69,11 +68,14 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
     let (machine, ready) = (&args.machine, |_: &mut Machine, _: &Store| Ok(()));
     let run = |_: &mut Machine, _: &Store, ()| Ok(());
     let ((), counters) = with_zeroed_volume(machine, "zero", Use::Motion, output, ready, run)?;
-    let text = "x, y and z: zero found on their index pulses";
-    output.result(
-        text,
-        &json!({"axes": ["x", "y", "z"], "counters": counters}),
-    )
+    output.told(zeroed(), counters)
+}
+
+pub(super) fn zeroed() -> Told {
+    Told {
+        text: "x, y and z: zero found on their index pulses".into(),
+        value: json!({"axes": ["x", "y", "z"]}),
+    }
 }
 
 /// How the machine becomes warm.
@@ -215,18 +217,10 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     let mut value = verified_value(&verified);
     value["counters"] = counters;
     let text = verified_text(&verified);
-    if args.uncompensated || verified.is_within_tolerance() {
-        return output.result(&text, &value);
+    match verified.out_of_tolerance().filter(|_| !args.uncompensated) {
+        None => output.result(&text, &value),
+        Some(failure) => output.bad_result(&text, value, failure),
     }
-    output.bad_result(&text, value, out_of_tolerance(&verified))
-}
-
-pub(crate) fn out_of_tolerance(verified: &VolumetricVerified) -> Failure {
-    VolumetricFailure::OutOfTolerance {
-        seen: verified.range,
-        limit: verified.limit,
-    }
-    .into()
 }
 
 pub(crate) fn verified_text(verified: &VolumetricVerified) -> String {

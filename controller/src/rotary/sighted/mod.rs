@@ -18,4 +18,11 @@ mod stand;
 #[cfg(feature = "program")]
 mod tests;
 
+/// What whoever keeps a machine calls a question for the value of a line.
+pub(crate) const READ_LINE: &str = "read_line";
+/// The same for whether a placement shall be closed.
+pub(crate) const CLOSE_PLACEMENT: &str = "close_placement";
+/// The word that closes it; at a terminal it is Enter alone.
+pub(crate) const CLOSE: &str = "close";
+
 pub use person::{Asked, Person, Question};

@@ -8,6 +8,7 @@ use units::Metres;
 use crate::store::IdentityRecord;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::calibrate::known::expansion_plans;
+use crate::volumetric::line::{LineOptics, LineTask};
 use crate::volumetric::reference::stretches;
 use crate::volumetric::settings::{
     bend_plans, function_shape, point_of_mm, volumetric_chain, work_volume,
@@ -82,6 +83,22 @@ pub(crate) fn volume_plan(
         },
         lines,
     ))
+}
+
+/// What a person is asked to set up for line `number` of all of them.
+pub(crate) fn set_up_task(lines: &[StandardLine], number: usize) -> LineTask {
+    let line = &lines[number];
+    LineTask {
+        optics: match line.optics {
+            Optics::Linear => LineOptics::Linear,
+            Optics::Straightness(across) => LineOptics::Straightness { across },
+            Optics::Angle(about) => LineOptics::Angular { about },
+        },
+        start: line.from,
+        end: line.to,
+        tool: line.tool,
+        step: (number + 1, lines.len()),
+    }
 }
 
 /// Whose error it is.

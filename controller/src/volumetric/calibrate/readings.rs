@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::identify::{Observation, Optics};
+use compensator::volumetric::identify::Observation;
 use compensator::volumetric::online::{Displacement, MovingState};
 use compensator::volumetric::{Axis, Point};
 use units::{Celsius, Metres};
@@ -10,10 +10,11 @@ use units::{Celsius, Metres};
 use crate::failure::Failure;
 use crate::store::Journal;
 use crate::volumetric::calibrate::Session;
+use crate::volumetric::calibrate::plan::set_up_task;
 use crate::volumetric::correction::lever;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::slide_of;
-use crate::volumetric::line::{LineOptics, LineReadout, LineTask};
+use crate::volumetric::line::LineReadout;
 use crate::volumetric::{LineReadEntry, LineReadingEntry};
 use crate::volumetric::{VolumeEntry, VolumeLog};
 
@@ -57,17 +58,7 @@ impl WorkVolume<'_> {
         journal: &mut Journal<VolumeLog>,
     ) -> Result<Vec<Celsius>, Failure> {
         let line = session.lines[number];
-        let task = LineTask {
-            optics: match line.optics {
-                Optics::Linear => LineOptics::Linear,
-                Optics::Straightness(across) => LineOptics::Straightness { across },
-                Optics::Angle(about) => LineOptics::Angular { about },
-            },
-            start: line.from,
-            end: line.to,
-            tool: line.tool,
-            step: (number + 1, session.lines.len()),
-        };
+        let task = set_up_task(&session.lines, number);
         let readout = LineReadout {
             instrument: session.own.instrument.clone(),
             settle: Duration::from_secs_f64(session.own.settle_ms * 1e-3),

@@ -99,7 +99,8 @@ function card(axis) {
     told(ask("POST", `/v1/axes/${encodeURIComponent(axis.name)}/${event.target.dataset.verb}`));
   });
   byId("axes").append(made);
-  byId("axis").append(new Option(axis.name, axis.name));
+  const groups = [...byId("axis").options].map((it) => it.value);
+  if (!groups.includes(axis.group)) byId("axis").append(new Option(axis.group, axis.group));
   showControl();
   return made;
 }
@@ -154,14 +155,16 @@ function showAxes(list) {
     const u = axis.standard_uncertainty;
     shown.querySelector(".uncertainty").textContent = u ? `± ${(2 * u.value).toFixed(3)} ${unit(u)} (k = 2)` : "";
     const bar = shown.querySelector("meter");
-    const [low, high] = [axis.soft_min.value, axis.soft_max.value];
-    bar.value = axis.encoder ? (axis.encoder.value - low) / (high - low) : 0;
-    bar.title = `${low} to ${high} ${axis.soft_min.unit}`;
+    const turns = axis.soft_min === null;
+    const [low, high] = turns ? [0, 360] : [axis.soft_min.value, axis.soft_max.value];
+    const at = axis.encoder ? axis.encoder.value : low;
+    bar.value = (turns ? ((at % 360) + 360) % 360 : at - low) / (high - low);
+    bar.title = turns ? "turns endlessly" : `${low} to ${high} ${axis.soft_min.unit}`;
     const facts = {
       zero: axis.homed ? "found" : "not found yet",
       calibration: axis.calibration ? axis.calibration.slice(0, 8) : "none",
       correction: axis.corrected && axis.position && axis.encoder
-        ? `${((axis.position.value - axis.encoder.value) * 1e3).toFixed(3)} µm` : "–",
+        ? correction(axis.position.value - axis.encoder.value, axis.position.unit) : "–",
       encoder: number(axis.encoder, 6),
       target: number(axis.target, 6),
       limits: bar.title,
@@ -180,6 +183,9 @@ function showAxes(list) {
   }
 }
 
+// What a calibration adds, in the unit of small things.
+const correction = (it, of) => (of === "deg" ? `${(it * 3600).toFixed(3)} arcsec` : `${(it * 1e3).toFixed(3)} µm`);
+
 function element(name, text, kind) {
   const made = document.createElement(name);
   made.textContent = text;
@@ -194,6 +200,27 @@ function button(text, act) {
   return made;
 }
 
+// What a run asks, with a button for each answer, and a line for what was read.
+function asking(run) {
+  const { number: question, text, answers, takes_text: takes } = run.question;
+  const shown = element("div", "", "question");
+  const say = (answer) => ask("POST", `/v1/runs/${run.id}/answers`, { question, answer });
+  shown.append(...text.split("\n").map((line) => element("p", line)));
+  if (takes) {
+    const [form, input] = [document.createElement("form"), document.createElement("input")];
+    input.required = true;
+    input.setAttribute("aria-label", "answer");
+    const send = element("button", "Answer", "command");
+    send.disabled = token === null;
+    form.append(input, " ", send);
+    form.addEventListener("submit", (event) => { event.preventDefault(); told(say(input.value)); });
+    shown.append(form);
+  }
+  shown.append(...answers.map((answer) => button(answer, () => say(answer))));
+  shown.dataset.number = question;
+  return shown;
+}
+
 // A run only ever goes on: what was asked for before an event came may arrive after it. What is older than a state:
 const UNDER_WAY = ["planned", "running", "stopping", "paused"];
 const OLDER = { planned: [], running: ["planned"], stopping: ["planned", "running"], paused: ["planned", "stopping"],
@@ -203,16 +230,30 @@ function showRun(run) {
   const known = plans.get(run.id);
   if (known && OLDER[known.state].includes(run.state)) return;
   plans.set(run.id, run);
-  const shown = byId(`run-${run.id}`) || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
+  // What is typed for a question stays while the question does.
+  const before = byId(`run-${run.id}`);
+  const asked = before && before.querySelector(".question");
+  const shown = before || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
   shown.id = `run-${run.id}`;
-  const { points, travel, seconds_at_least: seconds } = run.plan;
-  const parts = [element("h3", `${run.kind} ${run.axes.join(", ")} · ${run.id}`), element("p", run.state, run.state)];
-  if (points) parts.push(element("p", `${points} points, ${number(travel, 0)}, ${seconds.toFixed(0)} s at least`));
+  const { points, travel, seconds_at_least: seconds, asks } = run.plan;
+  const parts = [element("h3", `${run.kind} ${run.of || run.axes.join(", ")} · ${run.id}`), element("p", run.state, run.state)];
+  const way = travel ? `, ${number(travel, 0)}` : "";
+  if (points) parts.push(element("p", `${points} points${way}${seconds ? `, ${seconds.toFixed(0)} s at least` : ""}`));
+  if (run.state === "planned" && asks.length) {
+    const list = document.createElement("ol");
+    list.append(...asks.map((it) => element("li", it)));
+    parts.push(element("p", "A person is asked:"), list);
+  }
+  if (run.question) {
+    const same = asked && asked.dataset.number === String(run.question.number);
+    parts.push(same ? asked : asking(run));
+  }
   if (run.steps && run.state === "running") {
     const bar = document.createElement("progress");
     [bar.max, bar.value] = [run.steps, run.steps_done];
     parts.push(bar);
   }
+  if (run.out_of_tolerance) parts.push(element("p", run.out_of_tolerance.cause, "failed"));
   if (run.cause) parts.push(element("p", run.cause.cause, "failed"));
   if (run.stopped) parts.push(element("p", `stopped by ${run.stopped.by}`));
   if (run.result) {
@@ -224,7 +265,7 @@ function showRun(run) {
   }
   const doing = document.createElement("p");
   if (run.state === "planned") doing.append(button("Start", () => ask("POST", `/v1/runs/${run.id}/start`)));
-  if (run.state === "running" && run.kind !== "zero") doing.append(button("Pause", () => ask("POST", `/v1/runs/${run.id}/pause`)));
+  if (run.state === "running" && run.can_resume) doing.append(button("Pause", () => ask("POST", `/v1/runs/${run.id}/pause`)));
   if (run.state === "paused") doing.append(button("Resume", () => ask("POST", `/v1/runs/${run.id}/resume`)));
   if (["planned", "running", "paused"].includes(run.state)) doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
   shown.replaceChildren(...parts, doing);
@@ -251,12 +292,13 @@ function follow(after) {
   stream.addEventListener("open", () => told(showAll()));
   stream.addEventListener("error", () => { byId("state").textContent = "connection lost; trying again …"; });
   stream.addEventListener("sample", (message) => showAxes(JSON.parse(message.data)));
-  for (const kind of ["machine", "axis", "position", "motion", "run", "stop", "lease", "calibration", "warning"]) {
+  for (const kind of ["machine", "axis", "position", "motion", "run", "question", "stop", "lease", "calibration", "warning"]) {
     stream.addEventListener(kind, async (message) => {
       const event = JSON.parse(message.data);
       showEvent(event);
       if (kind === "machine" || kind === "lease") showMachine(await ask("GET", "/v1/machine"));
       if (kind === "run") showRun(event.data.id ? event.data : { ...plans.get(event.of), ...event.data });
+      if (kind === "question") showRun({ ...plans.get(event.of), question: event.data.answer ? null : event.data });
     });
   }
 }

@@ -12,7 +12,7 @@ use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
 use crate::order::Order;
 use crate::problem::{Problem, ProblemBody};
-use crate::request::RunRequest;
+use crate::request::{AnswerRequest, RunRequest};
 use crate::view::RunView;
 
 /// The runs that are known.
@@ -140,5 +140,28 @@ pub(super) async fn resume(
 ) -> Result<Json<RunView>, Problem> {
     enough(admitted.role, of_run(state.desk.run(&id)?.kind))?;
     obey(&state.desk, &caller, Order::Resume { run: id.clone() }).await?;
+    Ok(Json(state.desk.run(&id)?))
+}
+
+/// Answers what a run asks: it goes on.
+#[utoipa::path(
+    post, path = "/runs/{id}/answers", tag = "runs", request_body = AnswerRequest, params(Asks, ("id" = String, Path, description = "Its name")),
+    responses(
+        (status = 200, description = "It is answered", body = RunView),
+        (status = "4XX", description = "It asks nothing, or something else, or is not answered so", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn answer(
+    Of(state): Of<State>,
+    By(caller): By,
+    Named(id): Named,
+    Body(answer): Body<AnswerRequest>,
+) -> Result<Json<RunView>, Problem> {
+    let order = Order::Answer {
+        run: id.clone(),
+        answer,
+    };
+    obey(&state.desk, &caller, order).await?;
     Ok(Json(state.desk.run(&id)?))
 }

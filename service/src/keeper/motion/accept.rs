@@ -5,12 +5,13 @@ use core::time::Duration;
 use machine::Machine;
 use serde_json::json;
 use truestage::Agreed;
-use truestage::linear::{Course, PlannedMove};
-use units::{Metres, MetresPerSecond, Time};
+use truestage::rotary::Way;
+use units::{MetresPerSecond, Time};
 
-use super::super::seat::{MovedBy, Seat, Task};
+use super::super::seat::{Seat, Task};
 use super::super::stop::stopped_by;
 use super::super::{Keeper, utc_now};
+use super::going::{Going, Wanted};
 use super::{End, Leg, LegPhase, Motion, Phase};
 use crate::problem::{Code, Problem};
 use crate::request::{IfMoving, MoveRequest};
@@ -64,8 +65,8 @@ impl Keeper {
         let legs = request.targets.iter().map(|(axis, target)| {
             Ok(Leg {
                 at: self.place(axis)?,
-                target: target.0,
-                planned: None,
+                target: *target,
+                going: None,
                 deadline: Time::NEVER,
                 phase: LegPhase::Waiting,
             })
@@ -76,10 +77,13 @@ impl Keeper {
             id: id.into(),
             by: by.to_owned(),
             accepted: utc_now(),
-            speed: speed_of(request)?,
-            agreed: Agreed {
-                uncompensated: request.uncompensated,
-                beyond: request.beyond,
+            wanted: Wanted {
+                agreed: Agreed {
+                    uncompensated: request.uncompensated,
+                    beyond: request.beyond,
+                },
+                speed: speed_of(request)?,
+                way: request.way.map(Way::from),
             },
             dead_man: dead_man.map(|it| (it, now + it)),
             jog: None,
@@ -90,14 +94,20 @@ impl Keeper {
 
     /// What each axis is sent, and how fast; everything is judged before anything moves.
     pub(super) fn plan_legs(&self, machine: &Machine, motion: &mut Motion) -> Result<(), Problem> {
-        let (agreed, wanted) = (motion.agreed, motion.speed);
+        let wanted = motion.wanted;
+        let is_round = |leg: &Leg| matches!(leg.going, Some(Going::Round(_)));
         motion.legs.iter_mut().try_for_each(|leg| {
             let seat = &self.seats[leg.at];
-            let mut planned = plan_leg(machine, seat, leg.target, agreed)?;
-            planned.speed = wanted.map_or(planned.speed, |it| it.min(planned.speed));
-            leg.planned = Some(planned);
-            Ok(())
-        })
+            leg.going = Some(Going::plan(machine, seat, leg.target, wanted)?);
+            Ok::<_, Problem>(())
+        })?;
+        match wanted.way {
+            Some(_) if !motion.legs.iter().any(is_round) => {
+                let what = "`way` is for axes that turn, and this motion has none";
+                Err(Problem::new(Code::NotOffered, what, "leave it out"))
+            }
+            Some(_) | None => Ok(()),
+        }
     }
 
     /// Makes the axes of a new motion free, lets it wait, or refuses it.
@@ -176,33 +186,9 @@ fn speed_of(request: &MoveRequest) -> Result<Option<MetresPerSecond>, Problem> {
     }
 }
 
-fn plan_leg(
-    machine: &Machine,
-    seat: &Seat,
-    target: Metres,
-    agreed: Agreed,
-) -> Result<PlannedMove, Problem> {
-    let axis = &seat.name;
-    let alone = Course::default();
-    let course = match (seat.moved_by, agreed.uncompensated) {
-        (MovedBy::Platform, _) => {
-            let what = format!("axis {axis} carries the platform and is not moved by itself");
-            let help = "use `truestage move` for the platform";
-            return Err(Problem::new(Code::NotOffered, what, help));
-        }
-        (MovedBy::Volume, false) => {
-            let what = format!("axis {axis} is corrected only together with the other two");
-            let help = "ask for it with \"uncompensated\": true, or use `truestage move`";
-            return Err(Problem::new(Code::NotOffered, what, help));
-        }
-        (MovedBy::Volume, true) | (MovedBy::Itself, true) => &alone,
-        (MovedBy::Itself, false) => &seat.course,
-    };
-    let planned = course.plan(machine, axis, target)?;
-    planned.corrected.require(axis, target, agreed)?;
-    if seat.is_enabled(machine) {
-        return Ok(planned);
-    }
-    let what = format!("axis {axis} is switched off; nothing was moved");
-    Err(Problem::new(Code::AxisDisabled, what, "enable it first"))
+/// That the axis of `seat` is one that turns.
+pub(super) fn not_jogged(seat: &Seat) -> Problem {
+    let what = format!("axis {} turns, and is not jogged", seat.name);
+    let help = "ask for a motion to an angle, or use `truestage move`";
+    Problem::new(Code::NotOffered, what, help)
 }

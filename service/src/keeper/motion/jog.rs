@@ -7,6 +7,7 @@ use units::MetresPerSecond;
 
 use super::super::Keeper;
 use super::super::stop::stopped_by;
+use super::accept::not_jogged;
 use super::{End, Motion, Phase};
 use crate::problem::{Code, Problem};
 use crate::quantity::Speed;
@@ -68,7 +69,9 @@ impl Keeper {
         request: &JogRequest,
         at: usize,
     ) -> Result<Motion, Problem> {
-        let settings = &self.seats[at].settings;
+        let (settings, _) = self.seats[at]
+            .linear()
+            .ok_or_else(|| not_jogged(&self.seats[at]))?;
         let speed = request.speed.0;
         let target = match speed.value() > 0.0 {
             true => settings.soft_max,

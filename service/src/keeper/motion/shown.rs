@@ -1,20 +1,23 @@
 //! Motions as they are shown.
 
 use machine::Machine;
-use truestage::linear::{Corrected, Moved, Teller};
-use units::Metres;
+use truestage::linear::{Corrected, LinearTeller, Moved};
+use truestage::rotary::RotaryTeller;
+use truestage::runs::{Teller, Told};
 
+use super::super::mechanics::{Mechanics, approach};
 use super::super::seat::Seat;
+use super::going::Going;
 use super::{End, Leg, Motion, Phase};
-use crate::quantity::Quantity;
+use crate::coordinate::Coordinate;
 use crate::view::{LegView, MotionState, MotionView, ToldView};
 
 /// A motion that is under way.
 pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
     let legs = motion.legs.iter().map(|leg| {
         let view = LegView {
-            target: Quantity::mm(leg.target),
-            set_point: leg.planned.map(|it| Quantity::mm(it.set_point)),
+            target: leg.target.shown(),
+            set_point: leg.going.map(|it| it.set_point().shown()),
             corrected: leg.corrected().word().to_owned(),
             position: None,
             encoder: None,
@@ -43,7 +46,7 @@ pub(super) fn ended(
     motion: &Motion,
     seats: &[Seat],
     machine: &Machine,
-    teller: Option<Teller>,
+    teller: Option<&Teller>,
     end: End,
 ) -> MotionView {
     let mut view = view(motion, seats);
@@ -53,12 +56,12 @@ pub(super) fn ended(
             continue;
         };
         let sample = seat.sample(machine);
-        let place: Option<Metres> = sample.place.or(sample.encoder);
-        shown.position = place.map(Quantity::mm);
-        shown.encoder = sample.encoder.map(Quantity::mm);
-        shown.standard_uncertainty = sample.standard_uncertainty.map(Quantity::um);
+        let place = sample.place.or(sample.encoder);
+        shown.position = place.map(Coordinate::shown);
+        shown.encoder = sample.encoder.map(Coordinate::shown);
+        shown.standard_uncertainty = sample.standard_uncertainty.map(Coordinate::small);
         shown.told = match (&end, teller) {
-            (End::Done, Some(teller)) => told(leg, seat, machine, teller),
+            (End::Done, Some(teller)) => told(leg, seat, machine, teller).map(ToldView::from),
             _ => None,
         };
     }
@@ -72,26 +75,35 @@ pub(super) fn ended(
 }
 
 /// What the command line says of a move to where an axis stands now.
-fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: Teller) -> Option<ToldView> {
-    let encoder = machine.reading(&seat.name).ok().flatten()?.position;
-    let approach = seat.approach(machine);
+fn told(leg: &Leg, seat: &Seat, machine: &Machine, teller: &Teller) -> Option<Told> {
     let is_corrected = leg.corrected() != Corrected::No;
-    let moved = Moved {
-        target: leg.target,
-        set_point: leg.planned?.set_point,
-        encoder,
-        approach,
-        corrected: leg.corrected(),
-        place: seat
-            .course
-            .place(encoder, approach)
-            .filter(|_| is_corrected),
-        uncertainty: seat
-            .course
-            .uncertainty_at(encoder, approach, leg.has_arrived())
-            .filter(|_| is_corrected),
-    };
     let calibration = seat.calibration.as_ref().filter(|_| is_corrected);
-    let told = (teller.moved)(&seat.name, &moved, calibration.map(|it| &*it.id));
-    Some(ToldView::from(told))
+    let calibration = calibration.map(|it| it.id.as_str());
+    let encoder = seat.mechanics.sampled(machine, &seat.name)?.position;
+    match (&seat.mechanics, leg.going?, encoder) {
+        (Mechanics::Linear(own), Going::Along(planned), Coordinate::Length(encoder)) => {
+            let Coordinate::Length(target) = leg.target else {
+                return None;
+            };
+            let (course, approach) = (&own.course, approach(machine, &seat.name));
+            let uncertainty = course.uncertainty_at(encoder, approach, leg.has_arrived());
+            let moved = Moved {
+                target,
+                set_point: planned.set_point,
+                encoder,
+                approach,
+                corrected: leg.corrected(),
+                place: course.place(encoder, approach).filter(|_| is_corrected),
+                uncertainty: uncertainty.filter(|_| is_corrected),
+            };
+            let teller = teller.of::<LinearTeller>()?;
+            Some((teller.moved)(&seat.name, &moved, calibration))
+        }
+        (Mechanics::Turning(course), Going::Round(planned), Coordinate::Angle(reading)) => {
+            let moved = course.moved(&planned, reading);
+            let teller = teller.of::<RotaryTeller>()?;
+            Some((teller.moved)(&seat.name, &moved, calibration))
+        }
+        _ => None,
+    }
 }

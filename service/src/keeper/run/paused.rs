@@ -1,6 +1,7 @@
 //! Runs that are paused, and those that an earlier service left: they go on with what was measured.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use machine::Machine;
 use machine::records::InterruptedRun;
@@ -24,7 +25,7 @@ impl Keeper {
     ) -> Result<(), Problem> {
         let run = self.runs.find(id)?;
         match run.view.state {
-            RunState::Running if run.view.kind.verb().is_some() => {
+            RunState::Running if run.task.is_resumed => {
                 run.is_pausing = true;
                 self.slow_down_run(machine);
                 Ok(())
@@ -32,8 +33,8 @@ impl Keeper {
             RunState::Paused => Ok(()),
             RunState::Running => Err(Problem::new(
                 Code::RunState,
-                "a zero cannot go on where it was left",
-                "abort it, and zero again",
+                format!("run {id} cannot go on where it was left"),
+                "abort it, and start it again",
             )),
             _ => Err(Problem::new(
                 Code::RunState,
@@ -67,33 +68,38 @@ impl Keeper {
     /// A run of `kind` that was interrupted before this service began is offered as a paused one. One that the
     /// configuration does not know any more is not.
     pub(crate) fn offer_run(&mut self, kind: RunKind, found: &InterruptedRun) {
-        let axis = &found.header.axis;
-        let Ok((at, plan)) = self
-            .place(axis)
-            .and_then(|at| Ok((at, self.plan_of(kind, at)?)))
-        else {
+        let journals = &found.header.axis;
+        let mut groups = self.groups.iter();
+        let Some(at) = groups.position(|it| it.group.journals() == journals) else {
             return;
         };
+        let Ok(plan) = self.plan_of(kind, at) else {
+            return;
+        };
+        let grouped = &self.groups[at];
+        let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let id = found.journal.file_stem().unwrap_or_default();
         let id = id.to_string_lossy().into_owned();
         let request = RunRequest {
             uncompensated: kind == RunKind::Verify && found.header.calibration.is_none(),
             start: false,
-            ..RunRequest::of(kind, Some(axis))
+            ..RunRequest::of(kind, Some(&group.name))
         };
         let view = RunView {
             state: RunState::Paused,
+            can_resume: true,
             journal: Some(text(&found.journal)),
-            ..RunView::planned(&id, EARLIER, kind, vec![axis.clone()], plan)
+            ..RunView::planned(&id, EARLIER, kind, (&group.name, group.axes.clone()), plan)
         };
         self.events.push("run", &id, json!(view));
         let task = Task {
             id: id.into(),
             request,
-            axis: Some(axis.clone()),
+            group,
+            is_resumed: true,
             resume: Some(found.journal.clone()),
         };
-        self.runs.keep(Run::new(task, vec![at], view));
+        self.runs.keep(Run::new(task, axes, view));
     }
 }
 

@@ -1,0 +1,133 @@
+//! What is run on linear axes for whoever keeps a machine: each by itself.
+
+use machine::Stage;
+use machine::records::Store;
+use serde_json::json;
+
+use crate::config::MachineConfig;
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::linear::{LinearTeller, VerifyOptions};
+use crate::run::{CalibrateOptions, missing};
+use crate::runs::{Found, Group, GroupRuns, Planned, Task, Travel, Work};
+
+pub(crate) static RUNS: GroupRuns = GroupRuns {
+    groups,
+    offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
+    resumed: |_, _, stage| matches!(stage, Stage::Calibrate | Stage::Verify),
+    refuse: |_| Ok(()),
+    planned,
+    perform,
+    load,
+};
+
+fn groups(config: &MachineConfig) -> Vec<Group> {
+    let axes = config.axis.keys();
+    axes.map(|it| Group::of_one(it, &RUNS)).collect()
+}
+
+fn planned(machine: &mut Machine, axis: &str, stage: Stage) -> Result<Planned, Failure> {
+    let stage_of = machine.linear(axis)?;
+    if stage == Stage::Zero {
+        let zero = stage_of.config().zero.as_ref();
+        return zero
+            .map(|_| Planned::default())
+            .ok_or_else(|| missing(axis, "zero"));
+    }
+    let plan = stage_of.planned(stage);
+    let plan = plan.ok_or_else(|| missing(axis, stage.text()))?;
+    Ok(Planned {
+        points: plan.points,
+        travel: Some(Travel::Length(plan.travel)),
+        at_least: plan.at_least,
+        asks: Vec::new(),
+    })
+}
+
+fn perform(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
+    match task.stage {
+        Stage::Calibrate => calibrate(work, axis, task),
+        Stage::Verify => verify(work, axis, task),
+        Stage::Zero | Stage::Reference | Stage::Job => zero(work, axis),
+    }
+}
+
+fn words(work: &Work<'_>) -> Option<&'static LinearTeller> {
+    work.teller?.of()
+}
+
+fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
+    let words = words(&work);
+    let zeroed = work.machine.linear(axis)?.zero(work.store)?;
+    let estimate = &zeroed.estimate;
+    Ok(Found {
+        figures: json!({
+            "origin_um": estimate.origin.um(),
+            "standard_uncertainty_um": estimate.standard_uncertainty.um(),
+            "points": estimate.points,
+            "journal": zeroed.journal,
+        }),
+        told: words.map(|it| (it.zeroed)(axis, &zeroed)),
+        bad: None,
+    })
+}
+
+fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
+    let options = CalibrateOptions {
+        resume: task.resume.clone(),
+        accept_drift: task.accept_drift,
+        ..CalibrateOptions::default()
+    };
+    let words = words(&work);
+    let mut stage = work.machine.linear(axis)?;
+    let made = stage.calibrate(work.store, &options)?;
+    Ok(Found {
+        figures: json!({
+            "calibration": made.id,
+            "largest_deviation_um": made.fitted.table.largest().um(),
+            "positions": made.fitted.table.nodes().len(),
+            "closure_um": made.measured.closure.map(|it| it.um()),
+            "journal": made.journal,
+        }),
+        told: words.map(|it| (it.calibrated)(&made)),
+        bad: None,
+    })
+}
+
+fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
+    let words = words(&work);
+    let compensated = !task.uncompensated;
+    let calibration = match compensated {
+        true => work.machine.linear(axis)?.load_active(work.store)?,
+        false => None,
+    };
+    let options = VerifyOptions {
+        compensated,
+        calibration,
+        resume: task.resume.clone(),
+    };
+    let mut stage = work.machine.linear(axis)?;
+    let verified = stage.verify(work.store, &options)?;
+    Ok(Found {
+        figures: json!({
+            "accuracy_um": verified.figures.accuracy.bidirectional.um(),
+            "tolerance_um": verified.tolerance.um(),
+            "within_tolerance": verified.is_within_tolerance(),
+            "journal": verified.journal,
+        }),
+        told: words.map(|it| (it.verified)(axis, &verified, compensated)),
+        bad: verified.out_of_tolerance(axis).filter(|_| compensated),
+    })
+}
+
+fn load(
+    machine: &mut Machine,
+    store: &Store,
+    axis: &str,
+) -> Result<Vec<(String, Option<String>)>, Failure> {
+    let id = match machine.config().axis[axis].compensation {
+        None => None,
+        Some(_) => machine.linear(axis)?.load_active(store)?,
+    };
+    Ok(vec![(axis.to_owned(), id)])
+}

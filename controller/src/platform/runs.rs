@@ -1,0 +1,142 @@
+//! What is run on an alignment platform for whoever keeps a machine: all of its screws together.
+
+use machine::Stage;
+use machine::records::Store;
+use serde_json::json;
+
+use crate::config::MachineConfig;
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::platform::{PlatformFailure, PlatformTeller};
+use crate::runs::{Found, Group, GroupRuns, Moved, Planned, Task, Work};
+
+/// What its screws are called together.
+const WHOLE: &str = "platform";
+
+pub(crate) static RUNS: GroupRuns = GroupRuns {
+    groups,
+    offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
+    resumed: |_, _, _| false,
+    refuse,
+    planned,
+    perform,
+    load,
+};
+
+fn groups(config: &MachineConfig) -> Vec<Group> {
+    let group = config.platform.iter().map(|platform| {
+        let screws = platform.actuator.iter();
+        Group {
+            name: WHOLE.to_owned(),
+            axes: screws.map(|it| it.axis.clone()).collect(),
+            moved: Moved::Together,
+            journals: WHOLE.to_owned(),
+            runs: &RUNS,
+        }
+    });
+    group.collect()
+}
+
+fn refuse(task: &Task) -> Result<(), Failure> {
+    if !task.accept_drift {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "a platform that has drifted cannot be calibrated".into(),
+        help: "wait until the temperature has settled, or raise closure_limit_um".into(),
+    })
+}
+
+fn planned(machine: &mut Machine, _: &str, stage: Stage) -> Result<Planned, Failure> {
+    let platform = machine.platform()?;
+    let config = platform.config;
+    let missing = |section| PlatformFailure::NotConfigured { section };
+    let points = match stage {
+        Stage::Calibrate => {
+            let own = config.calibrate.as_ref().ok_or(missing("calibrate"))?;
+            let strokes = config.actuator.iter().map(|it| own.strokes_of(it));
+            let places: usize = strokes.map(|it| it.targets().len()).sum();
+            2 * places as u64 * u64::from(own.runs)
+        }
+        Stage::Verify => {
+            let own = config.verify.as_ref().ok_or(missing("verify"))?;
+            u64::from(own.poses)
+        }
+        Stage::Zero | Stage::Reference | Stage::Job => 0,
+    };
+    Ok(Planned {
+        points,
+        ..Planned::default()
+    })
+}
+
+fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
+    match task.stage {
+        Stage::Calibrate => calibrate(work),
+        Stage::Verify => verify(work, task),
+        Stage::Zero | Stage::Reference | Stage::Job => zero(work),
+    }
+}
+
+fn words(work: &Work<'_>) -> Option<&'static PlatformTeller> {
+    work.teller?.of()
+}
+
+fn zero(work: Work<'_>) -> Result<Found, Failure> {
+    let words = words(&work);
+    let zeroed = work.machine.platform()?.zero(work.store)?;
+    let datum = zeroed.datum;
+    Ok(Found {
+        figures: json!({
+            "datum_x_mm": datum.x.mm(),
+            "datum_y_mm": datum.y.mm(),
+            "datum_theta_arcsec": datum.angle.arcsec(),
+            "journal": zeroed.journal,
+        }),
+        told: words.map(|it| (it.zeroed)(&zeroed)),
+        bad: None,
+    })
+}
+
+fn calibrate(work: Work<'_>) -> Result<Found, Failure> {
+    let words = words(&work);
+    let made = work.machine.platform()?.calibrate(work.store)?;
+    Ok(Found {
+        figures: json!({
+            "screws": made.screws.len(),
+            "closure_um": made.closure.um(),
+            "journal": made.journal,
+        }),
+        told: words.map(|it| (it.calibrated)(&made)),
+        bad: None,
+    })
+}
+
+fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
+    let words = words(&work);
+    let compensated = !task.uncompensated;
+    let mut platform = work.machine.platform()?;
+    if compensated {
+        platform.load_active(work.store)?;
+    }
+    let verified = platform.verify(work.store, compensated)?;
+    Ok(Found {
+        figures: json!({
+            "largest_um": verified.largest.um(),
+            "rms_um": verified.rms.um(),
+            "tolerance_um": verified.tolerance.um(),
+            "within_tolerance": verified.is_within_tolerance(),
+            "journal": verified.journal,
+        }),
+        told: words.map(|it| (it.verified)(&verified, compensated)),
+        bad: verified.out_of_tolerance().filter(|_| compensated),
+    })
+}
+
+fn load(
+    machine: &mut Machine,
+    store: &Store,
+    _: &str,
+) -> Result<Vec<(String, Option<String>)>, Failure> {
+    machine.platform()?.load_active(store)
+}

@@ -1,0 +1,72 @@
+//! What a person is asked of a plate, when a service asks it.
+
+use compensator::rotary::Sighted;
+use serde_json::Value;
+use units::Radians;
+
+use crate::Failure;
+use crate::program::answering::{Asked, entered, not_understood};
+use crate::program::exchange::plain;
+use crate::program::operator::Terminal;
+use crate::rotary::sighted::{self, Person as _, Question};
+use crate::rotary::{Operator as _, PlateTask};
+
+pub(crate) const ASKED: &[Asked] = &[
+    Asked {
+        what: PlateTask::WHAT,
+        ask: |terminal, _, task| {
+            let task: PlateTask = serde_json::from_value(task.clone())
+                .map_err(|_| not_understood(PlateTask::WHAT))?;
+            terminal.ask(&PlateTask {
+                axis: plain(&task.axis),
+                plate: plain(&task.plate),
+                ..task
+            })
+        },
+        answer: entered,
+    },
+    Asked {
+        what: sighted::READ_LINE,
+        ask: read_line,
+        answer: Terminal::answer,
+    },
+    Asked {
+        what: sighted::CLOSE_PLACEMENT,
+        ask: |terminal, text, _| put(terminal, sighted::Asked::Close, text, false),
+        answer: |terminal| {
+            let answer = terminal.answer()?;
+            Ok(answer.map(|it| match it.trim() {
+                "" => sighted::CLOSE.to_owned(),
+                word => word.to_owned(),
+            }))
+        },
+    },
+];
+
+fn read_line(terminal: &mut Terminal, text: &str, task: &Value) -> Result<(), Failure> {
+    let line = task["line"].as_u64().and_then(|it| u32::try_from(it).ok());
+    let nominal = task["nominal_deg"].as_f64().map(Radians::from_degrees);
+    let (Some(line), Some(nominal), Some("to_line")) = (line, nominal, task["value"].as_str())
+    else {
+        return Err(not_understood(sighted::READ_LINE));
+    };
+    let asked = sighted::Asked::Line {
+        line,
+        value: Sighted::ToLine,
+        nominal,
+    };
+    put(terminal, asked, text, true)
+}
+
+fn put(
+    terminal: &mut Terminal,
+    asked: sighted::Asked,
+    text: &str,
+    turns: bool,
+) -> Result<(), Failure> {
+    terminal.question(&Question {
+        asked,
+        text: plain(text),
+        turns,
+    })
+}

@@ -1,0 +1,144 @@
+//! Axes that are run together.
+
+use machine::Stage;
+use machine::records::Store;
+
+use super::person::Person;
+use super::task::{Found, Planned, Task, Work};
+use super::teller::Teller;
+use crate::config::MachineConfig;
+use crate::connected::Machine;
+use crate::failure::Failure;
+
+/// How the axes of a group are moved outside of runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// Each by itself, by what corrects it.
+    Alone,
+    /// Each by itself only uncorrected: what corrects them corrects them together.
+    CorrectedTogether,
+    /// Never by themselves.
+    Together,
+}
+
+/// Axes that are zeroed, calibrated and verified together: PLCopen's axes group. Of most machines each axis is one by
+/// itself.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// What it is called: its axis, where it has only one.
+    pub name: String,
+    /// Its axes.
+    pub axes: Vec<String>,
+    /// How they are moved.
+    pub moved: Moved,
+    /// What its journals are called.
+    pub(crate) journals: String,
+    /// What its kind does for it.
+    pub(crate) runs: &'static GroupRuns,
+}
+
+/// What a kind runs.
+#[derive(Debug)]
+pub(crate) struct GroupRuns {
+    /// What of a machine it runs as one.
+    pub(crate) groups: fn(&MachineConfig) -> Vec<Group>,
+    /// Which runs there are.
+    pub(crate) offered: &'static [Stage],
+    /// Which of them can go on where they were left.
+    pub(crate) resumed: fn(&MachineConfig, &str, Stage) -> bool,
+    /// Options that it has no use for.
+    pub(crate) refuse: fn(&Task) -> Result<(), Failure>,
+    /// What a run of this group will do.
+    pub(crate) planned: fn(&mut Machine, &str, Stage) -> Result<Planned, Failure>,
+    /// Does it.
+    pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
+    /// Uses the active calibration of each of its axes: the axis, and its calibration.
+    pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
+}
+
+/// Which calibration each axis uses.
+pub(crate) type InUse = Vec<(String, Option<String>)>;
+
+impl Group {
+    /// One axis by itself.
+    pub(crate) fn of_one(axis: &str, runs: &'static GroupRuns) -> Self {
+        Self {
+            name: axis.to_owned(),
+            axes: vec![axis.to_owned()],
+            moved: Moved::Alone,
+            journals: axis.to_owned(),
+            runs,
+        }
+    }
+
+    /// Which runs it has.
+    pub const fn offered(&self) -> &'static [Stage] {
+        self.runs.offered
+    }
+
+    /// What its journals are called.
+    pub fn journals(&self) -> &str {
+        &self.journals
+    }
+
+    /// Whether a run of it can go on where it was left.
+    pub fn is_resumed(&self, config: &MachineConfig, stage: Stage) -> bool {
+        (self.runs.resumed)(config, &self.name, stage)
+    }
+
+    /// Refuses options that a run of it has no use for.
+    ///
+    /// # Errors
+    /// When `task` has one.
+    pub fn refuse(&self, task: &Task) -> Result<(), Failure> {
+        (self.runs.refuse)(task)
+    }
+
+    /// What a run of it will do.
+    ///
+    /// # Errors
+    /// When it is not configured.
+    pub fn planned(&self, machine: &mut Machine, stage: Stage) -> Result<Planned, Failure> {
+        (self.runs.planned)(machine, &self.name, stage)
+    }
+
+    /// Does what `task` says. `person` does what has to be done by hand, and `teller` says what came of it.
+    ///
+    /// # Errors
+    /// Those of the procedure.
+    pub fn perform(
+        &self,
+        machine: &mut Machine,
+        store: &Store,
+        task: &Task,
+        person: &mut dyn Person,
+        teller: Option<&Teller>,
+    ) -> Result<Found, Failure> {
+        if task.stage != Stage::Zero {
+            self.axes.iter().try_for_each(|it| machine.enable(it))?;
+        }
+        let work = Work {
+            machine,
+            store,
+            person,
+            teller,
+        };
+        let mut found = (self.runs.perform)(work, &self.name, task)?;
+        if let (Some(told), Some(teller)) = (&mut found.told, teller) {
+            told.value["counters"] = (teller.counters)(machine);
+        }
+        Ok(found)
+    }
+
+    /// Uses the active calibration of each of its axes from now on, and says which that is.
+    ///
+    /// # Errors
+    /// When one does not belong to this machine, or cannot be used.
+    pub fn load(
+        &self,
+        machine: &mut Machine,
+        store: &Store,
+    ) -> Result<Vec<(String, Option<String>)>, Failure> {
+        (self.runs.load)(machine, store, &self.name)
+    }
+}

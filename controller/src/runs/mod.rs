@@ -1,0 +1,20 @@
+//! What is run on a machine of whatever kind for those who do not have it in their hands: said beforehand, with
+//! somebody who is asked meanwhile, and told at the end.
+//!
+//! A kind says what of a machine it runs as one ([`Group`]), and does it, by the same procedures as the verbs of the
+//! command line: `runs.rs` in its folder. [`groups`](crate::groups) lists what a machine has.
+
+mod group;
+mod person;
+mod task;
+mod teller;
+
+pub use group::{Group, Moved};
+pub use person::{Person, Question};
+pub use task::{Found, Planned, Task, Travel};
+pub use teller::{Teller, Told};
+
+pub(crate) use group::GroupRuns;
+pub(crate) use task::Work;
+#[cfg(feature = "program")]
+pub(crate) use teller::Words;

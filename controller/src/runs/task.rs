@@ -1,0 +1,68 @@
+//! What is run, what it will take, and what came of it.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use machine::Stage;
+use machine::records::Store;
+use serde_json::Value;
+use units::{Metres, Radians};
+
+use super::person::Person;
+use super::teller::{Teller, Told};
+use crate::connected::Machine;
+use crate::failure::Failure;
+
+/// A run that is to be done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Which.
+    pub stage: Stage,
+    /// The journal that it goes on with.
+    pub resume: Option<PathBuf>,
+    /// Calibrate: store although the same place differs too much between beginning and end.
+    pub accept_drift: bool,
+    /// Verify: as found, without the calibration.
+    pub uncompensated: bool,
+}
+
+/// How far something goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Travel {
+    /// Along a way.
+    Length(Metres),
+    /// Round and round.
+    Angle(Radians),
+}
+
+/// What a run will do.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Planned {
+    /// How many points are measured.
+    pub points: u64,
+    /// How far the axis goes for them, where that is known.
+    pub travel: Option<Travel>,
+    /// How long that takes at least.
+    pub at_least: Duration,
+    /// What a person will be asked, in this order.
+    pub asks: Vec<String>,
+}
+
+/// What a procedure works with.
+pub(crate) struct Work<'w> {
+    pub(crate) machine: &'w mut Machine,
+    pub(crate) store: &'w Store,
+    pub(crate) person: &'w mut dyn Person,
+    pub(crate) teller: Option<&'w Teller>,
+}
+
+/// What a run found.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// The figures that matter.
+    pub figures: Value,
+    /// The same, as the command line prints it.
+    pub told: Option<Told>,
+    /// Why the result is a bad one, although it is one.
+    pub bad: Option<Failure>,
+}

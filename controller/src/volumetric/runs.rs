@@ -1,0 +1,157 @@
+//! What is run on three axes for whoever keeps a machine: all of them together, and a person sets lines up.
+
+use machine::Stage;
+use serde_json::json;
+
+use crate::config::MachineConfig;
+use crate::connected::Machine;
+use crate::failure::Failure;
+use crate::runs::{Found, Group, GroupRuns, Moved, Planned, Task, Work};
+use crate::volumetric::asked::Asking;
+use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
+use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricTeller, WarmUp};
+
+/// What the three axes are called together.
+const WHOLE: &str = "volume";
+
+pub(crate) static RUNS: GroupRuns = GroupRuns {
+    groups,
+    offered: &[
+        Stage::Zero,
+        Stage::Calibrate,
+        Stage::Verify,
+        Stage::Reference,
+    ],
+    resumed: |_, _, stage| stage == Stage::Calibrate,
+    refuse,
+    planned,
+    perform,
+    load: |_, _, _| Ok(Vec::new()),
+};
+
+fn groups(config: &MachineConfig) -> Vec<Group> {
+    let volume = config.volumetric.iter();
+    let group = volume.map(|volume| Group {
+        name: WHOLE.to_owned(),
+        axes: volume.axes.to_vec(),
+        moved: Moved::CorrectedTogether,
+        journals: GEOMETRY.to_owned(),
+        runs: &RUNS,
+    });
+    group.collect()
+}
+
+fn refuse(task: &Task) -> Result<(), Failure> {
+    if !task.accept_drift {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: "a calibration of three axes is not judged by its closure".into(),
+        help: "start it again without accepting drift".into(),
+    })
+}
+
+fn planned(machine: &mut Machine, _: &str, stage: Stage) -> Result<Planned, Failure> {
+    let volume = machine.volumetric()?;
+    match stage {
+        Stage::Calibrate => volume.planned_calibration(),
+        Stage::Verify => volume.planned_verification(),
+        Stage::Zero | Stage::Reference | Stage::Job => Ok(Planned::default()),
+    }
+}
+
+impl WorkVolume<'_> {
+    fn planned_calibration(&self) -> Result<Planned, Failure> {
+        let (plan, lines) = volume_plan(self.config, false, Vec::new())?;
+        let numbered = plan.lines.iter().enumerate();
+        let set_up = numbered.filter(|(_, line)| !line.by_detectors);
+        let asks = set_up.map(|(number, _)| set_up_task(&lines, number).text());
+        Ok(Planned {
+            points: plan.lines.iter().map(|line| line.points as u64).sum(),
+            asks: asks.collect(),
+            ..Planned::default()
+        })
+    }
+
+    fn planned_verification(&self) -> Result<Planned, Failure> {
+        let own = self.verify_config()?;
+        Ok(Planned {
+            points: u64::from(own.points),
+            asks: vec![self.verified_line(&own).text()],
+            ..Planned::default()
+        })
+    }
+}
+
+fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
+    match task.stage {
+        Stage::Zero | Stage::Job => zero(work),
+        Stage::Calibrate => calibrate(work, task),
+        Stage::Verify => verify(work, task),
+        Stage::Reference => reference(work),
+    }
+}
+
+fn words(work: &Work<'_>) -> Option<&'static VolumetricTeller> {
+    work.teller?.of()
+}
+
+fn zero(work: Work<'_>) -> Result<Found, Failure> {
+    let words = words(&work);
+    work.machine.volumetric()?.zero()?;
+    Ok(Found {
+        figures: json!({}),
+        told: words.map(|it| (it.zeroed)()),
+        bad: None,
+    })
+}
+
+fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
+    let words = words(&work);
+    let (store, resume) = (work.store, task.resume.as_deref());
+    let mut volume = work.machine.volumetric()?;
+    let made = volume.calibrate(store, WarmUp::None, resume, &mut Asking(work.person))?;
+    Ok(Found {
+        figures: json!({
+            "geometry": made.id,
+            "references": made.references,
+            "lines": made.lines,
+            "u_tool_max_um": made.u_max.um(),
+            "journal": made.journal,
+        }),
+        told: words.map(|it| (it.calibrated)(&made)),
+        bad: None,
+    })
+}
+
+fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
+    let words = words(&work);
+    let by = match task.uncompensated {
+        true => VerifyBy::AsFound,
+        false => VerifyBy::Everything,
+    };
+    let mut volume = work.machine.volumetric()?;
+    volume.check_verify(work.store, by)?;
+    let verified = volume.verify(work.store, by, &mut Asking(work.person))?;
+    Ok(Found {
+        figures: json!({
+            "range_um": verified.range.um(),
+            "tolerance_um": verified.limit.um(),
+            "within_tolerance": verified.is_within_tolerance(),
+            "journal": verified.journal,
+        }),
+        told: words.map(|it| (it.verified)(&verified)),
+        bad: verified.out_of_tolerance().filter(|_| !task.uncompensated),
+    })
+}
+
+fn reference(work: Work<'_>) -> Result<Found, Failure> {
+    let words = words(&work);
+    let taken = work.machine.volumetric()?.reference(work.store)?;
+    Ok(Found {
+        figures: json!({"references": taken.id, "geometry": taken.references.content.geometry}),
+        told: words.map(|it| (it.referenced)(&taken)),
+        bad: None,
+    })
+}

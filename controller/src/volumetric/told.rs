@@ -1,0 +1,19 @@
+//! What three axes gave, in the words of the command line.
+
+use crate::runs::Told;
+use crate::volumetric::VolumetricCalibrated;
+use crate::volumetric::reference::VolumetricReferenced;
+use crate::volumetric::verify::VolumetricVerified;
+
+/// Who says it ([`Teller::of`](crate::runs::Teller::of)).
+#[derive(Clone, Copy, Debug)]
+pub struct VolumetricTeller {
+    /// Zeros that were found.
+    pub zeroed: fn() -> Told,
+    /// A calibration that was made.
+    pub calibrated: fn(calibrated: &VolumetricCalibrated) -> Told,
+    /// A verification.
+    pub verified: fn(verified: &VolumetricVerified) -> Told,
+    /// References that were taken.
+    pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
+}

@@ -1,0 +1,108 @@
+//! Axes that are run together, and which of them a run is for.
+
+use std::sync::Arc;
+
+use machine::Stage;
+use truestage::Machine;
+use truestage::runs::Group;
+
+use super::Keeper;
+use super::setup::{Plans, plans, resumed};
+use crate::problem::{Code, Problem};
+use crate::request::RunKind;
+use crate::view::RunPlanView;
+
+/// A group, and what its runs would do.
+#[derive(Debug)]
+pub(crate) struct Grouped {
+    pub(super) group: Arc<Group>,
+    pub(super) plans: Plans,
+    resumed: Vec<Stage>,
+    /// The numbers of its axes.
+    pub(super) axes: Vec<usize>,
+}
+
+impl Grouped {
+    /// Whether its run of `kind` goes on where it was left.
+    pub(super) fn is_resumed(&self, kind: RunKind) -> bool {
+        self.resumed.contains(&kind.stage())
+    }
+}
+
+impl Keeper {
+    /// What is run on `machine`.
+    pub(crate) fn add_groups(&mut self, machine: &mut Machine, groups: Vec<Group>) {
+        for group in groups {
+            let axes = group.axes.iter();
+            let axes = axes.filter_map(|it| self.place(it).ok()).collect();
+            self.groups.push(Grouped {
+                plans: plans(machine, &group),
+                resumed: resumed(machine, &group),
+                group: Arc::new(group),
+                axes,
+            });
+        }
+    }
+
+    /// What runs would do now: what was measured meanwhile is known.
+    pub(crate) fn plan_anew(&mut self, machine: &mut Machine) {
+        for grouped in &mut self.groups {
+            grouped.plans = plans(machine, &grouped.group);
+        }
+    }
+
+    /// All groups.
+    pub(crate) fn groups(&self) -> Vec<Arc<Group>> {
+        let groups = self.groups.iter();
+        groups.map(|it| Arc::clone(&it.group)).collect()
+    }
+
+    /// The number of the group that a run is for.
+    pub(super) fn group_of(&self, asked: Option<&str>) -> Result<usize, Problem> {
+        match (asked, self.groups.as_slice()) {
+            (None, [_]) => Ok(0),
+            (None, groups) => {
+                let names: Vec<_> = groups.iter().map(|it| it.group.name.as_str()).collect();
+                let what = "the machine has several axes";
+                let help = format!("name one in `axis`: {}", names.join(", "));
+                Err(Problem::new(Code::BadRequest, what, help))
+            }
+            (Some(name), groups) => {
+                let found = groups.iter().position(|it| it.group.name == name);
+                found.map_or_else(|| Err(self.no_group(name)), Ok)
+            }
+        }
+    }
+
+    /// Why `name` is no group: it is in one, or there is no such axis.
+    fn no_group(&self, name: &str) -> Problem {
+        let at = match self.place(name) {
+            Ok(at) => at,
+            Err(problem) => return problem,
+        };
+        let of = self.groups.iter().find(|it| it.axes.contains(&at));
+        let (axes, group) = of.map_or((String::new(), ""), |it| {
+            (it.group.axes.join(", "), it.group.name.as_str())
+        });
+        let what = format!("axis {name} is not run by itself, but {axes} together");
+        let help = format!("say `axis`: \"{group}\", or leave it out");
+        Problem::new(Code::NotOffered, what, help)
+    }
+
+    /// What the run of `kind` of group `at` will do.
+    pub(super) fn plan_of(&self, kind: RunKind, at: usize) -> Result<RunPlanView, Problem> {
+        let grouped = &self.groups[at];
+        if let Some(plan) = grouped.plans.get(&kind) {
+            return plan.clone();
+        }
+        let offered = grouped.group.offered().iter().map(|it| it.text());
+        let offered: Vec<_> = offered.collect();
+        let what = format!(
+            "{} has no run `{}`",
+            grouped.group.name,
+            kind.stage().text()
+        );
+        let help = format!("it has {}", offered.join(", "));
+        Err(Problem::new(Code::NotOffered, what, help))
+    }
+}

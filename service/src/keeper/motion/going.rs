@@ -1,0 +1,186 @@
+//! What one axis of a motion is sent, by what it is: along a way, or round and round.
+
+use machine::{Driving, Failure, Machine, Moving};
+use truestage::linear::{Corrected, PlannedMove};
+use truestage::rotary::{PlannedTurn, Way};
+use truestage::runs::Moved;
+use truestage::{Agreed, linear};
+use units::{Metres, MetresPerSecond, Radians};
+
+use super::super::mechanics::{Linear, Mechanics};
+use super::super::seat::Seat;
+use crate::coordinate::Coordinate;
+use crate::problem::{Code, Problem};
+
+/// What an axis is to do: everything has been judged.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Going {
+    Along(PlannedMove),
+    Round(PlannedTurn),
+}
+
+/// How whoever asks for a motion wants it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    pub(super) agreed: Agreed,
+    pub(super) speed: Option<MetresPerSecond>,
+    pub(super) way: Option<Way>,
+}
+
+impl Going {
+    /// What the axis of `seat` is to do to be at `target`.
+    pub(super) fn plan(
+        machine: &Machine,
+        seat: &Seat,
+        target: Coordinate,
+        wanted: Wanted,
+    ) -> Result<Self, Problem> {
+        let planned = match (&seat.mechanics, target) {
+            (Mechanics::Linear(own), Coordinate::Length(target)) => {
+                along(machine, seat, own, (target, wanted)).map(Self::Along)
+            }
+            (Mechanics::Turning(_), Coordinate::Angle(angle)) => {
+                round(machine, seat, (angle, wanted)).map(Self::Round)
+            }
+            (Mechanics::Linear(_), Coordinate::Angle(_)) => {
+                Err(other_unit(seat, "goes along a way", "a length: \"12.5mm\""))
+            }
+            (Mechanics::Turning(_), Coordinate::Length(_)) => {
+                Err(other_unit(seat, "turns", "an angle: \"12.5deg\""))
+            }
+        }?;
+        if seat.is_enabled(machine) {
+            return Ok(planned);
+        }
+        let what = format!("axis {} is switched off; nothing was moved", seat.name);
+        Err(Problem::new(Code::AxisDisabled, what, "enable it first"))
+    }
+
+    /// Where its point goes; angles count on over the turns.
+    pub(super) fn target(&self, asked: Coordinate) -> Coordinate {
+        match self {
+            Self::Along(_) => asked,
+            Self::Round(it) => it.target.into(),
+        }
+    }
+
+    /// What its drive is sent first, where that is not the last.
+    pub(super) fn by_way_of(&self) -> Option<Coordinate> {
+        match self {
+            Self::Along(it) => it.by_way_of.map(Coordinate::from),
+            Self::Round(_) => None,
+        }
+    }
+
+    /// What its drive is sent last.
+    pub(super) fn set_point(&self) -> Coordinate {
+        match self {
+            Self::Along(it) => it.set_point.into(),
+            Self::Round(it) => it.set_point.into(),
+        }
+    }
+
+    /// Whether a calibration corrects it.
+    pub(super) const fn corrected(&self) -> Corrected {
+        match self {
+            Self::Along(it) => it.corrected,
+            Self::Round(PlannedTurn {
+                corrected: true, ..
+            }) => Corrected::Within,
+            Self::Round(_) => Corrected::No,
+        }
+    }
+
+    /// Begins the move of the axis `name` to `set_point`.
+    pub(super) fn begin(
+        &self,
+        machine: &mut Machine,
+        name: &str,
+        set_point: Coordinate,
+    ) -> Result<(), Failure> {
+        match (self, set_point) {
+            (Self::Along(it), Coordinate::Length(set_point)) => {
+                Moving::of(machine, name)?.begin(set_point, it.speed)
+            }
+            (Self::Along(_), Coordinate::Angle(_)) => Ok(()),
+            (Self::Round(it), _) => it.begin(machine, name),
+        }
+    }
+
+    /// How the move of the axis `name` to `set_point` ended, once it has; from which side it came is remembered.
+    pub(super) fn has_arrived(
+        machine: &mut Machine,
+        name: &str,
+        set_point: Option<Coordinate>,
+    ) -> Result<bool, Failure> {
+        let Some(outcome) = Driving::of(machine, name)?.outcome() else {
+            return Ok(false);
+        };
+        outcome?;
+        if let Some(Coordinate::Length(set_point)) = set_point {
+            Moving::of(machine, name)?.arrived(set_point);
+        }
+        Ok(true)
+    }
+}
+
+fn other_unit(seat: &Seat, what_it_does: &str, expected: &str) -> Problem {
+    let what = format!("`targets.{}`: the axis {what_it_does}", seat.name);
+    Problem::new(Code::NotOffered, what, format!("give {expected}"))
+}
+
+fn along(
+    machine: &Machine,
+    seat: &Seat,
+    own: &Linear,
+    (target, wanted): (Metres, Wanted),
+) -> Result<PlannedMove, Problem> {
+    let (axis, agreed) = (&seat.name, wanted.agreed);
+    let alone = linear::Course::default();
+    let course = match (seat.moved, agreed.uncompensated) {
+        (Moved::Together, _) => {
+            let what = format!("axis {axis} moves only together with others, and not by itself");
+            let help = "use `truestage move` while the service is not running";
+            return Err(Problem::new(Code::NotOffered, what, help));
+        }
+        (Moved::CorrectedTogether, false) => {
+            let what = format!("axis {axis} is corrected only together with the other two");
+            let help = "ask for it with \"uncompensated\": true, or use `truestage move`";
+            return Err(Problem::new(Code::NotOffered, what, help));
+        }
+        (Moved::CorrectedTogether | Moved::Alone, true) => &alone,
+        (Moved::Alone, false) => &own.course,
+    };
+    let mut planned = course.plan(machine, axis, target)?;
+    planned.corrected.require(axis, target, agreed)?;
+    planned.speed = wanted
+        .speed
+        .map_or(planned.speed, |it| it.min(planned.speed));
+    Ok(planned)
+}
+
+fn round(
+    machine: &Machine,
+    seat: &Seat,
+    (angle, wanted): (Radians, Wanted),
+) -> Result<PlannedTurn, Problem> {
+    let axis = &seat.name;
+    if wanted.speed.is_some() {
+        let what = format!("`speed` is that of axes along a way, and axis {axis} turns");
+        return Err(Problem::new(Code::NotOffered, what, "leave it out"));
+    }
+    machine
+        .require_zeroed(axis)
+        .map_err(truestage::Failure::from)?;
+    let reading = machine.devices().rotary_reading(axis);
+    let reading = reading.map_err(truestage::Failure::from)?;
+    let course = match &seat.mechanics {
+        Mechanics::Turning(course) if wanted.agreed.uncompensated => course.uncompensated(),
+        Mechanics::Turning(course) => (**course).clone(),
+        Mechanics::Linear(_) => return Err(other_unit(seat, "goes along a way", "a length")),
+    };
+    course.require(axis, wanted.agreed)?;
+    let here = reading.map_or(Radians::ZERO, |it| it.position);
+    let way = wanted.way.unwrap_or(Way::Shortest);
+    Ok(course.plan(axis, here, angle, way)?)
+}

@@ -1,0 +1,193 @@
+//! Runs of machines whose axes work together: an alignment platform, and three axes of a volume.
+
+use std::path::Path;
+
+use mock_bus::plant::{LineOptics, LineSetUp};
+use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
+use tests::{Edit, UVW, VOLUMETRIC};
+use units::Metres;
+
+use super::{Bed, SEED, anna, bert, each, to};
+use crate::client::PATIENCE;
+use crate::stage::Stage;
+
+const SCREWS: [&str; 3] = ["u", "v", "w"];
+
+/// Fewer strokes and poses: how good they are is asked elsewhere.
+fn short(text: String) -> String {
+    text.edit("poses = 20", "poses = 4")
+}
+
+fn with_platform(body: impl Fn(&Bed<'_>)) {
+    let new = |rig, folder: &Path| Stage::new(rig, (UVW, SEED), folder, short);
+    each(new, body);
+}
+
+#[test]
+fn a_platform_is_zeroed_calibrated_and_verified_as_one() {
+    with_platform(|bed| {
+        let refused = bed
+            .client
+            .plan(&anna(), &RunRequest::of(RunKind::Zero, Some("u")));
+        let refused = refused.unwrap_err();
+        assert_eq!(refused.code, Code::NotOffered);
+        assert!(refused.to_string().contains("platform"), "{refused}");
+        let drifted = RunRequest {
+            accept_drift: true,
+            ..RunRequest::of(RunKind::Calibrate, Some("platform"))
+        };
+        let refused = bed.client.plan(&anna(), &drifted).unwrap_err();
+        assert!(refused.to_string().contains("drifted"), "{refused}");
+        let early = bed
+            .client
+            .plan(&anna(), &RunRequest::of(RunKind::Calibrate, None));
+        assert_eq!(early.unwrap_err().code, Code::NotZeroed);
+
+        bed.client.zero(&anna(), None);
+        let id = bed.run_of(RunKind::Calibrate);
+        let made = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(made.state, RunState::Done, "{made:?}");
+        assert_eq!((made.of.as_str(), made.axes.len()), ("platform", 3));
+        for screw in SCREWS {
+            let axis = bed.client.axis(screw).unwrap();
+            assert_eq!((axis.state, axis.homed), (AxisState::Standstill, true));
+            assert_eq!(axis.group, "platform");
+            assert!(axis.calibration.is_some(), "{axis:?}");
+        }
+        let id = bed.run_of(RunKind::Verify);
+        let judged = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(judged.state, RunState::Done, "{judged:?}");
+        assert_eq!(judged.result["within_tolerance"], true, "{judged:?}");
+        assert_eq!(judged.out_of_tolerance, None);
+    });
+}
+
+#[test]
+fn a_platform_that_is_stopped_in_a_run_stands_and_goes_on_without_a_reset() {
+    with_platform(|bed| {
+        bed.client.zero(&anna(), None);
+        for mode in [StopMode::Controlled, StopMode::Quick] {
+            let id = bed.run_of(RunKind::Calibrate);
+            let refused = bed.client.pause(&bert(), &id).unwrap_err();
+            assert_eq!(refused.code, Code::RunState, "{refused}");
+            bed.let_time_pass(1.0);
+            bed.client.stop(&bert(), mode).unwrap();
+            let run = bed.client.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+            assert_eq!(run.stopped.unwrap().by, "bert");
+            let expected = match mode {
+                StopMode::Controlled => AxisState::Standstill,
+                StopMode::Quick => AxisState::Disabled,
+            };
+            for screw in SCREWS {
+                assert_eq!(bed.client.axis(screw).unwrap().state, expected);
+            }
+        }
+        bed.client.zero(&anna(), None);
+    });
+}
+
+/// Three places on a short line.
+fn short_line(text: String) -> String {
+    text.edit(
+        "to_mm = [500.0, 400.0, 150.0]",
+        "to_mm = [60.0, 40.0, 150.0]",
+    )
+    .edit("points = 11", "points = 3")
+    .edit("average_samples = 60", "average_samples = 20")
+}
+
+fn with_volume(body: impl Fn(&Bed<'_>)) {
+    let new = |rig, folder: &Path| Stage::new(rig, (VOLUMETRIC, SEED), folder, short_line);
+    each(new, |bed| {
+        bed.client.zero(&anna(), None);
+        body(bed);
+    });
+}
+
+fn as_found() -> RunRequest {
+    RunRequest {
+        uncompensated: true,
+        ..RunRequest::of(RunKind::Verify, None)
+    }
+}
+
+#[test]
+fn three_axes_read_a_line_that_somebody_sets_up_and_stand_enabled_afterwards() {
+    with_volume(|bed| {
+        let plan = RunRequest {
+            start: false,
+            ..RunRequest::of(RunKind::Calibrate, Some("volume"))
+        };
+        let planned = bed.client.plan(&anna(), &plan).unwrap();
+        let planned = bed
+            .client
+            .run(&planned, core::time::Duration::ZERO)
+            .unwrap();
+        let asks = &planned.plan.asks;
+        assert!(asks.len() > 8 && asks[0].contains("line 1 of "), "{asks:?}");
+
+        let id = bed.client.plan(&anna(), &as_found()).unwrap();
+        let question = bed.asked(&id);
+        assert_eq!(question.what, "set_up_line");
+        assert!(question.text.contains("line 1 of 1"), "{question:?}");
+        assert_eq!(question.task["end_mm"][0], 60.0);
+        for axis in ["x", "y", "z"] {
+            assert_eq!(bed.client.axis(axis).unwrap().group, "volume");
+        }
+        let tool = question.task["tool_mm"].clone();
+        let tool = [0, 1, 2].map(|k| Metres::from_mm(tool[k].as_f64().expect("a place")));
+        let line = LineSetUp {
+            optics: LineOptics::Linear,
+            along: [60.0, 40.0, 0.0],
+            tool_offset: tool,
+        };
+        bed.stage
+            .simulation(move |machine| machine.set_up_line(&line));
+        bed.answer(&id, 1, "done").unwrap();
+        let judged = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(judged.state, RunState::Done, "{judged:?}");
+        assert!(judged.result["range_um"].as_f64().is_some(), "{judged:?}");
+        // As any axis that stands.
+        let moved = bed.begin(&to("x", 12.5));
+        assert_eq!(bed.ended(&moved).state, MotionState::Done);
+        let id = bed.run_of(RunKind::Reference);
+        let never = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(
+            never.state,
+            RunState::Failed,
+            "nothing was measured: {never:?}"
+        );
+        assert_eq!(bed.client.machine().cause, None);
+    });
+}
+
+#[test]
+fn a_stop_while_three_axes_move_together_is_taken_at_once_and_needs_no_reset() {
+    for (mode, expected) in [
+        (StopMode::Controlled, AxisState::Standstill),
+        (StopMode::Quick, AxisState::Disabled),
+    ] {
+        with_volume(|bed| {
+            let id = bed.client.plan(&anna(), &as_found()).unwrap();
+            // On the way to where the line begins, 150 mm above the zero.
+            while bed.encoder_mm("z") < 20.0 {
+                bed.let_time_pass(0.02);
+            }
+            bed.client.stop(&bert(), mode).unwrap();
+            let run = bed.client.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+            assert_eq!(run.stopped.unwrap().by, "bert");
+            let stands = bed.encoder_mm("z");
+            assert!(stands < 140.0, "it went on to {stands} mm");
+            for axis in ["x", "y", "z"] {
+                assert_eq!(bed.client.axis(axis).unwrap().state, expected);
+            }
+            if mode == StopMode::Controlled {
+                let moved = bed.begin(&to("z", 10.0));
+                assert_eq!(bed.ended(&moved).state, MotionState::Done);
+            }
+            bed.client.zero(&anna(), None);
+        });
+    }
+}

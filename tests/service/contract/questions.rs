@@ -1,0 +1,253 @@
+//! Runs that ask a person: a rotary table, whose plate somebody turns.
+
+use core::time::Duration;
+
+use mock_bus::fault::Fault;
+use service::{
+    AnswerRequest, AxisState, Code, QuestionView, RunKind, RunRequest, RunState, RunView, StopMode,
+};
+use tests::{Edit, ROTARY};
+
+use super::{Bed, SEED, anna, bert, each};
+use crate::client::PATIENCE;
+use crate::stage::Stage;
+
+/// Three placements are few; how good the table becomes is asked elsewhere.
+pub(super) fn few_placements(text: String) -> String {
+    text.edit("placements = 4 ", "offsets = [0, 73, 162] ")
+        .edit("optimise = ", "# ")
+        .edit("amplification_limit = 3.0", "amplification_limit = 5.0")
+}
+
+fn with_table(body: impl Fn(&Bed<'_>)) {
+    let new =
+        |rig, folder: &std::path::Path| Stage::new(rig, (ROTARY, SEED), folder, few_placements);
+    each(new, |bed| {
+        bed.client.zero(&anna(), Some("c"));
+        body(bed);
+    });
+}
+
+/// Somebody who turns the plate, and remembers where it lies.
+pub(super) struct Hand<'b> {
+    bed: &'b Bed<'b>,
+    lies_at: f64,
+}
+
+impl<'b> Hand<'b> {
+    pub(super) const fn new(bed: &'b Bed<'b>) -> Self {
+        Self { bed, lies_at: 0.0 }
+    }
+
+    /// Does what is asked, and says so.
+    fn does(&mut self, id: &str, question: &QuestionView) {
+        let offset = question.task["offset"].as_f64().expect("an offset");
+        let lines = offset - self.lies_at;
+        self.lies_at = offset;
+        self.bed
+            .stage
+            .simulation(move |machine| machine.turn_plate(lines));
+        self.bed.answer(id, question.number, "done").unwrap();
+    }
+
+    /// Does all that the run `id` asks; how that ends.
+    pub(super) fn does_all(&mut self, id: &str) -> RunView {
+        loop {
+            match self.bed.asks_or_ends(id) {
+                RunView {
+                    question: Some(question),
+                    ..
+                } => self.does(id, &question),
+                ended => return ended,
+            }
+        }
+    }
+}
+
+impl Bed<'_> {
+    pub(super) fn run_of(&self, kind: RunKind) -> String {
+        let id = self.client.plan(&anna(), &RunRequest::of(kind, None));
+        id.unwrap_or_else(|problem| panic!("{problem}"))
+    }
+
+    pub(super) fn answer(
+        &self,
+        id: &str,
+        question: u32,
+        answer: &str,
+    ) -> Result<(), service::Problem> {
+        let answer = AnswerRequest {
+            question,
+            answer: answer.to_owned(),
+        };
+        self.client.answer(&anna(), id, &answer)
+    }
+
+    /// The run `id` when it asks something or has ended.
+    pub(super) fn asks_or_ends(&self, id: &str) -> RunView {
+        for _ in 0..10_000 {
+            let run = self.client.run(id, Duration::ZERO).expect("it was planned");
+            if run.question.is_some() || run.state.is_end() || run.state == RunState::Paused {
+                return run;
+            }
+            self.let_time_pass(0.05);
+        }
+        panic!(
+            "it neither asks nor ends: {:?}",
+            self.client.run(id, Duration::ZERO)
+        )
+    }
+
+    /// What the run `id` asks next.
+    pub(super) fn asked(&self, id: &str) -> QuestionView {
+        let run = self.asks_or_ends(id);
+        run.question.unwrap_or_else(|| panic!("{:?}", run.cause))
+    }
+}
+
+#[test]
+fn a_person_is_asked_by_number_and_the_run_goes_on_with_his_answer() {
+    with_table(|bed| {
+        let plan = RunRequest {
+            start: false,
+            ..RunRequest::of(RunKind::Calibrate, Some("c"))
+        };
+        let id = bed.client.plan(&anna(), &plan).unwrap();
+        let planned = bed.client.run(&id, Duration::ZERO).unwrap();
+        let asks = &planned.plan.asks;
+        assert_eq!(asks.len(), 3, "{asks:?}");
+        assert!(asks[1].contains("placement 2 of 3") && asks[1].contains("by 73 lines"));
+        assert_eq!(planned.plan.points, 3 * 3 * 360);
+        let early = bed.answer(&id, 1, "done").unwrap_err();
+        assert_eq!(early.code, Code::NotAsked, "{early}");
+        bed.client.start(&anna(), &id).unwrap();
+
+        let first = bed.asked(&id);
+        assert_eq!((first.number, first.what.as_str()), (1, "turn_plate"));
+        assert_eq!(first.text, asks[0]);
+        assert_eq!(
+            (first.answers.as_slice(), first.takes_text),
+            (&["done".to_owned()][..], false)
+        );
+        // Nobody has his hands in a table that is under power.
+        let axis = bed.client.axis("c").unwrap();
+        assert_eq!(axis.encoder.as_ref().unwrap().unit, "deg");
+        assert!(axis.soft_min.is_none());
+        let events = bed.client.events(0);
+        let asked = events.iter().find(|it| it.kind == "question");
+        assert_eq!(asked.expect("it is told").data["number"], 1);
+
+        let other = bed.answer(&id, 7, "done").unwrap_err();
+        assert_eq!(other.code, Code::NotAsked);
+        assert!(other.to_string().contains("`question` = 7"), "{other}");
+        let unknown = bed.answer(&id, 1, "maybe").unwrap_err();
+        assert_eq!(unknown.code, Code::NotAsked);
+        assert!(unknown.to_string().contains("`answer`") && unknown.to_string().contains("done"));
+        let waits = bed.client.run(&id, Duration::ZERO).unwrap();
+        assert_eq!(
+            waits.question.as_ref(),
+            Some(&first),
+            "nothing was answered"
+        );
+
+        let mut hand = Hand::new(bed);
+        hand.does(&id, &first);
+        // Whoever did not hear that it was taken says it again; another answer comes too late.
+        bed.answer(&id, 1, "done").unwrap();
+        let made = hand.does_all(&id);
+        assert_eq!(made.state, RunState::Done, "{made:?}");
+        let axis = bed.client.axis("c").unwrap();
+        assert_eq!(made.result["calibration"], axis.calibration.unwrap());
+        assert!(axis.corrected, "its place is corrected from now on");
+
+        let id = bed.run_of(RunKind::Verify);
+        let judged = hand.does_all(&id);
+        assert_eq!(judged.state, RunState::Done, "{judged:?}");
+        assert_eq!(judged.result["within_tolerance"], true, "{judged:?}");
+        assert_eq!(judged.out_of_tolerance, None);
+        // What its kind does not have is said.
+        let none = bed
+            .client
+            .plan(&anna(), &RunRequest::of(RunKind::Reference, None));
+        let none = none.unwrap_err();
+        assert_eq!(none.code, Code::NotOffered);
+        assert!(
+            none.to_string().contains("zero, calibrate, verify"),
+            "{none}"
+        );
+    });
+}
+
+#[test]
+fn the_axis_is_off_while_somebody_is_asked_and_a_stop_by_anybody_ends_that() {
+    with_table(|bed| {
+        for mode in [StopMode::Controlled, StopMode::Quick] {
+            let id = bed.run_of(RunKind::Calibrate);
+            let question = bed.asked(&id);
+            bed.let_time_pass(0.2);
+            bed.client.stop(&bert(), mode).unwrap();
+            let run = bed.client.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+            assert_eq!(run.stopped.as_ref().unwrap().by, "bert");
+            assert_eq!(run.question, None);
+            let late = bed.answer(&id, question.number, "done").unwrap_err();
+            assert_eq!(late.code, Code::NotAsked, "{late}");
+            let axis = bed.client.axis("c").unwrap();
+            assert_eq!((axis.state, axis.homed), (AxisState::Disabled, true));
+        }
+        let id = bed.run_of(RunKind::Calibrate);
+        bed.asked(&id);
+        bed.client.abort(&bert(), &id).unwrap();
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Stopped, "{run:?}");
+        // The machine is as it was.
+        bed.client.zero(&anna(), None);
+    });
+}
+
+#[test]
+fn a_run_that_waits_for_a_person_is_paused_and_goes_on_with_the_placements_that_are_read() {
+    with_table(|bed| {
+        let id = bed.run_of(RunKind::Calibrate);
+        let mut hand = Hand::new(bed);
+        let first = bed.asked(&id);
+        hand.does(&id, &first);
+        let second = bed.asked(&id);
+        assert_eq!(second.number, 2);
+        bed.client.pause(&bert(), &id).unwrap();
+        let paused = bed.paused(&id);
+        assert_eq!(paused.question, None);
+        assert!(paused.journal.is_some());
+        bed.client.resume(&anna(), &id).unwrap();
+        let again = bed.asked(&id);
+        assert_eq!(again.number, 3, "no number is used twice");
+        assert_eq!(again.task["offset"], second.task["offset"]);
+        hand.does(&id, &again);
+        let made = hand.does_all(&id);
+        assert_eq!(made.state, RunState::Done, "{made:?}");
+        // A verification by the detector is one placement: it cannot go on.
+        let id = bed.run_of(RunKind::Verify);
+        bed.asked(&id);
+        let refused = bed.client.pause(&bert(), &id).unwrap_err();
+        assert_eq!(refused.code, Code::RunState, "{refused}");
+        bed.client.abort(&bert(), &id).unwrap();
+    });
+}
+
+#[test]
+fn the_axis_stays_supervised_while_somebody_is_asked() {
+    with_table(|bed| {
+        let id = bed.run_of(RunKind::Calibrate);
+        let question = bed.asked(&id);
+        let fault = bed.stage.inject(Fault::StopHeartbeat {
+            node: "drive".to_owned(),
+        });
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Failed, "{run:?}");
+        assert_eq!(run.question, None);
+        assert!(bed.stage.deliveries(fault) > 0);
+        let late = bed.answer(&id, question.number, "done").unwrap_err();
+        assert_eq!(late.code, Code::NotAsked, "{late}");
+        assert_eq!(bed.client.axis("c").unwrap().state, AxisState::ErrorStop);
+    });
+}
