@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits, Node};
+use machine::records::Lease;
 use serde_json::Value;
 use tests::{Edit, LINEAR, ROTARY, random, seeds};
 use units::{Approach, Metres, MetresPerSecond};
@@ -568,6 +569,12 @@ const UNREAD: &[Unread] = &[
         "the file states the uncertainty",
     ),
     (
+        "position_mm,forward_um\n0,0\n60,1\n",
+        &["--format", "csv", "--axis", "q"],
+        2,
+        "q",
+    ),
+    (
         "",
         &["--format", "aerotech"],
         2,
@@ -637,8 +644,24 @@ fn an_imported_table_says_where_it_comes_from_and_is_in_use_only_when_asked() {
     // Commanded to 30 mm it is at 29.990 mm: too short.
     let deviation = record["nodes"][1]["forward_m"].as_f64().expect("a number");
     assert!((deviation + 10e-6).abs() < 0.02e-6, "{deviation}");
+    // Under somebody who has the machine it is stored, and said to be.
+    let store = truestage::for_tests::store_in(&here.join("machine-data"), "linear");
+    let verify = Lease::take(&store, "verify").expect("nobody else has it");
+    let activated = [&comp[..], &["--uncertainty-um", "1", "--activate"]].concat();
+    let refused = import(here, &activated).with_code(3);
+    check_error(&refused, &["in use by truestage verify"]);
+    assert_eq!((refused["active"].as_bool(), active()), (Some(false), None));
+    drop(verify);
     let second = import(here, &[&comp[..], &["--activate"]].concat()).with_code(0);
     assert_eq!(active().as_deref(), Some(text(&second["calibration"])));
+    // A calibration of another stage is not for this one's controls.
+    let other = LINEAR.machine.edit("TS-LIN-0001", "TS-LIN-0002");
+    fs::write(here.join("machine.toml"), other).expect("there is room");
+    let words = ["cal", "export", "machine.toml", id, "--format", "linuxcnc"];
+    check_error(
+        &truestage(here, &words).with_code(3),
+        &["the stage's serial number"],
+    );
 }
 
 const LINES: usize = 36;

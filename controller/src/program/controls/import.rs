@@ -64,40 +64,38 @@ pub(crate) fn run(
     let table = table(args)?;
     let loaded = config::load(&args.config)?;
     let axis = linear_axis(&args.config, &loaded.config, args.axis.as_deref())?;
+    // First of all whether there is such an axis.
+    let mut head = head_of(&loaded, &axis, &args.file)?;
     require_here(&loaded, &axis, &table, &args.file)?;
     if loaded.config.axis[&axis].compensation.is_some() {
         linear::settings::compensation(&loaded.config, &axis, table.clone())?;
     }
-    let mut head = head_of(&loaded, &axis, &args.file)?;
     head.instrument = InstrumentRecord {
         name: format!("table of another control ({})", args.format.in_words()),
         ..Default::default()
     };
     let content = LinearContent::new(&table, 0, None);
-    let id = loaded
-        .config
-        .machine
-        .store()
-        .save(&CalibrationRecord { head, content })?;
-    let mut text = told(&table, &axis);
+    let record = CalibrationRecord { head, content };
+    let id = loaded.config.machine.store().save(&record)?;
     let name = short(&id);
-    match args.activate {
-        true => {
-            activate(&args.config, &id)?;
-            text += &format!("\nstored as {name}, and in use");
-        }
-        false => {
-            let config = args.config.display();
-            text += &format!(
-                "\nstored as {name}; use it with `truestage cal activate {config} {name}`"
-            );
-        }
-    }
+    let mut text = format!("{}\nstored as {name}", told(&table, &axis));
+    // What is stored is told, whatever comes of using it.
+    let used = args.activate.then(|| activate(&args.config, &id));
+    text += &match &used {
+        Some(Ok(_)) => ", and in use".to_owned(),
+        _ => format!(
+            "; use it with `truestage cal activate {} {name}`",
+            args.config.display()
+        ),
+    };
     let (first, last) = table.range();
     let value = json!({"calibration": id, "axis": axis, "positions": table.nodes().len(),
                        "first_mm": first.mm(), "last_mm": last.mm(),
-                       "largest_deviation_um": table.largest().um(), "active": args.activate});
-    output.result(&text, &value)
+                       "largest_deviation_um": table.largest().um(), "active": matches!(used, Some(Ok(_)))});
+    match used {
+        Some(Err(failure)) => output.bad_result(&text, value, failure),
+        _ => output.result(&text, &value),
+    }
 }
 
 fn told(table: &ErrorTable, axis: &str) -> String {
