@@ -13,7 +13,7 @@
 
 use core::time::Duration;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::SocketAddr;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, Command};
@@ -25,6 +25,7 @@ use drivers::transport::{Histogram, SendError, SyncStatistics, Transport};
 use machine::Patience;
 use serde_json::{Value, json};
 use service::{Access, Desk, Edge, Listen, Opened, Service};
+use tests::flood::flood;
 use tests::{LINEAR, shipped_config};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::{Machine, ports};
@@ -43,7 +44,10 @@ fn main() {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["clients", socket, seconds] => clients(Path::new(socket), seconds_of(seconds)),
-        ["flood", address, seconds] => flood(address.parse().unwrap(), seconds_of(seconds)),
+        ["flood", address, seconds] => flood(
+            address.parse().unwrap(),
+            Instant::now() + seconds_of(seconds),
+        ),
         ["show", seconds, rounds] => show(seconds_of(seconds), rounds.parse().unwrap()),
         _ => eprintln!("load: `load show 10 9`"),
     }
@@ -356,55 +360,4 @@ fn hear(stream: &mut impl BufRead) {
         }
     }
     stream.read_exact(&mut vec![0; length]).unwrap();
-}
-
-/// Everything at once; what is refused or closed is tried again.
-fn flood(address: SocketAddr, span: Duration) {
-    let until = Instant::now() + span;
-    let host = "host: 127.0.0.1\r\n";
-    let half = format!("POST /v1/motions HTTP/1.1\r\n{host}");
-    let large = format!("POST /v1/motions HTTP/1.1\r\n{host}content-length: 10000000\r\n\r\n");
-    let stream = format!("GET /v1/events?sample_ms=5 HTTP/1.1\r\n{host}\r\n");
-    let ask = format!("GET /v1/axes HTTP/1.1\r\n{host}connection: close\r\n\r\n");
-    let zeros = vec![b' '; 10_000_000];
-    let connect = || TcpStream::connect_timeout(&address, Duration::from_secs(1)).ok();
-    thread::scope(|scope| {
-        // A thousand connections: nothing, half a head, a stream that nobody reads.
-        scope.spawn(|| {
-            let mut held = std::collections::VecDeque::new();
-            for text in ["", &half, &stream].iter().cycle() {
-                if let Some(mut stream) = connect() {
-                    let _ = stream.write_all(text.as_bytes());
-                    held.push_back(stream);
-                }
-                if held.len() >= 900 {
-                    held.pop_front();
-                    thread::park_timeout(Duration::from_millis(1));
-                }
-                if Instant::now() > until {
-                    return;
-                }
-            }
-        });
-        scope.spawn(|| {
-            while Instant::now() < until {
-                if let Some(mut stream) = connect() {
-                    let _ = stream.set_write_timeout(Some(Duration::from_secs(1)));
-                    let written = stream.write_all(large.as_bytes());
-                    let _ = written.and_then(|()| stream.write_all(&zeros));
-                }
-            }
-        });
-        for _ in 0..2 {
-            scope.spawn(|| {
-                while Instant::now() < until {
-                    if let Some(mut stream) = connect() {
-                        let _ = stream.set_read_timeout(Some(Duration::from_secs(1)));
-                        let _ = stream.write_all(ask.as_bytes());
-                        let _ = stream.read_to_end(&mut Vec::new());
-                    }
-                }
-            });
-        }
-    });
 }

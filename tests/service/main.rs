@@ -3,6 +3,7 @@
 mod client;
 mod contract;
 mod edge;
+mod flood;
 mod http;
 mod network;
 mod stage;

@@ -9,6 +9,7 @@ mod coverage;
 pub mod cycles;
 mod desk;
 mod emulator;
+pub mod flood;
 mod four_screws;
 mod group;
 mod hand;
