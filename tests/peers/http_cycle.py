@@ -50,7 +50,7 @@ class Cycle:
 
     def move(self):
         """To a target that is a text, and to one with value and unit."""
-        value, unit = self.models.LengthValue, self.models.LengthValueUnit
+        value, unit = self.models.PlaceValue, self.models.PlaceValueUnit
         for target in ("0mm", value(value=TARGET_MM, unit=unit("mm"))):
             targets = self.models.MoveRequestTargets.from_dict({})
             targets["x"] = target

@@ -11,42 +11,30 @@ use crate::rotary::sighted::{self, Asked, CLOSE, CLOSE_PLACEMENT, READ_LINE};
 use crate::runs::{Person, Question};
 
 /// Somebody who turns the plate, and reads its lines where no detector does.
-pub(crate) struct Asking<'p> {
-    person: &'p mut dyn Person,
-    /// What was asked last of what is read.
-    last: Option<Question>,
-}
-
-impl<'p> Asking<'p> {
-    pub(crate) fn new(person: &'p mut dyn Person) -> Self {
-        Self { person, last: None }
-    }
-}
+pub(crate) struct Asking<'p>(pub(crate) &'p mut dyn Person);
 
 impl Operator for Asking<'_> {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
         let question = Question::of_work(PlateTask::WHAT, task.text(), json!(task));
-        self.person.ask(question)
+        self.0.ask(question)
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
-        Ok(self.person.answer()?.is_some())
+        Ok(self.0.answer()?.is_some())
     }
 }
 
 impl sighted::Person for Asking<'_> {
     fn tell(&mut self, text: &str) {
-        self.person.tell(text);
+        self.0.tell(text);
     }
 
     fn question(&mut self, question: &sighted::Question) -> Result<(), Failure> {
-        let question = asked(question);
-        self.last = Some(question.clone());
-        self.person.ask(question)
+        self.0.ask(asked(question))
     }
 
     fn answer(&mut self) -> Result<Option<String>, Failure> {
-        let answer = self.person.answer()?;
+        let answer = self.0.answer()?;
         Ok(answer.map(|it| match it.trim() {
             CLOSE => String::new(),
             _ => it,
@@ -54,14 +42,9 @@ impl sighted::Person for Asking<'_> {
     }
 
     fn refuse(&mut self, why: &str) -> Result<(), Failure> {
-        let Some(last) = &self.last else {
-            return Ok(());
-        };
-        let text = format!("not taken: {why}\n{}", last.text);
-        self.person.ask(Question {
-            text,
-            ..last.clone()
-        })
+        // The question comes again, and begins with it.
+        self.0.tell(&format!("not taken: {why}"));
+        Ok(())
     }
 
     /// The machine lives on by its ticks.

@@ -163,7 +163,7 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
     let words = words(&work);
     let mut table = work.machine.rotary(axis)?;
     table.require_driven()?;
-    let (store, mut person) = (work.store, Asking::new(work.person));
+    let (store, mut person) = (work.store, Asking(work.person));
     let made = match table.config.sighting {
         None => table.calibrate(store, &options, &mut person),
         Some(_) => table.calibrate_sighted(store, &options, &mut person),
@@ -185,7 +185,7 @@ fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     let words = words(&work);
     let mut table = work.machine.rotary(axis)?;
     table.require_driven()?;
-    let (store, mut person) = (work.store, Asking::new(work.person));
+    let (store, mut person) = (work.store, Asking(work.person));
     // Uncompensated, too: it knows the plate's errors.
     table.load_active(store)?;
     let verified = match table.config.sighting {

@@ -6,7 +6,7 @@ use mock_bus::fault::Fault;
 use service::{
     AnswerRequest, AxisState, Code, QuestionView, RunKind, RunRequest, RunState, RunView, StopMode,
 };
-use tests::{Edit, ROTARY};
+use tests::{Edit, ROTARY, Shipped, with_few_lines};
 
 use super::{Bed, SEED, anna, bert, each};
 use crate::client::PATIENCE;
@@ -249,5 +249,86 @@ fn the_axis_stays_supervised_while_somebody_is_asked() {
         let late = bed.answer(&id, question.number, "done").unwrap_err();
         assert_eq!(late.code, Code::NotAsked, "{late}");
         assert_eq!(bed.client.axis("c").unwrap().state, AxisState::ErrorStop);
+    });
+}
+
+/// A plate of few lines on a table that these can see, which a person reads.
+fn with_a_reader(body: impl Fn(&Bed<'_>)) {
+    let emulated = with_few_lines(ROTARY.emulated).edit("lines = 72", "lines = 24");
+    let shipped = Shipped {
+        emulated: Box::leak(emulated.into_boxed_str()),
+        ..ROTARY
+    };
+    let read_by_a_person = |text: String| {
+        let detector =
+            "[rotary.c.line_detector]       # at the drive's touch probe 1\nedge = \"positive\"";
+        let sighting = "[rotary.c.sighting]\nvalue = \"to_line\"\nrange_arcsec = 200.0";
+        text.edit(detector, sighting)
+            .edit("lines = 360", "lines = 24")
+            .edit("offset_lines = 200.5", "offset_lines = 12.5")
+            .edit("closure_limit_arcsec = 0.1 ", "closure_limit_arcsec = 5.0 ")
+    };
+    let new = move |rig, folder: &std::path::Path| {
+        Stage::new(rig, (shipped, SEED), folder, read_by_a_person)
+    };
+    each(new, |bed| {
+        bed.client.zero(&anna(), Some("c"));
+        body(bed);
+    });
+}
+
+#[test]
+fn what_a_person_reads_of_a_plate_is_answered_line_by_line_and_nothing_else_is_taken() {
+    with_a_reader(|bed| {
+        let verify = RunRequest {
+            uncompensated: true,
+            ..RunRequest::of(RunKind::Verify, None)
+        };
+        let id = bed.client.plan(&anna(), &verify).unwrap();
+        let mut hand = Hand::new(bed);
+        let mut lines = 0;
+        let ended = loop {
+            let run = bed.asks_or_ends(&id);
+            let Some(question) = run.question else {
+                break run;
+            };
+            let number = question.number;
+            match question.what.as_str() {
+                "turn_plate" => hand.does(&id, &question),
+                "read_line" => {
+                    let line = question.task["line"].as_u64().expect("a line");
+                    let line = u32::try_from(line).expect("a plate has few");
+                    if lines == 0 {
+                        bed.answer(&id, number, "12 parsecs").unwrap();
+                        let again = bed.asked(&id);
+                        assert!(again.text.contains("not taken"), "{again:?}");
+                        assert_eq!(again.number, number + 1);
+                    }
+                    let seen = bed
+                        .stage
+                        .simulation(move |machine| machine.sight_line(line));
+                    let to_line = seen.to_line.map(|it| it.arcsec());
+                    let answer = to_line.map_or("none".to_owned(), |it| format!("{it}arcsec"));
+                    let number = bed.asked(&id).number;
+                    bed.answer(&id, number, &answer).unwrap();
+                    lines += 1;
+                }
+                "close_placement" => {
+                    assert!(question.answers.contains(&"close".to_owned()));
+                    bed.answer(&id, number, "close").unwrap();
+                }
+                other => panic!("{other}"),
+            }
+        };
+        assert_eq!(ended.state, RunState::Done, "{ended:?}");
+        assert_eq!(lines, 3 * 24);
+        // Who reads stops when he likes, and goes on later.
+        let id = bed.client.plan(&anna(), &verify).unwrap();
+        hand.does(&id, &bed.asked(&id));
+        let line = bed.asked(&id);
+        bed.answer(&id, line.number, "stop").unwrap();
+        let paused = bed.asks_or_ends(&id);
+        assert_eq!(paused.state, RunState::Paused, "{paused:?}");
+        assert!(paused.journal.is_some() && paused.can_resume, "{paused:?}");
     });
 }
