@@ -2,10 +2,11 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use tests::LINEAR;
 
-use crate::programs::{check_error, text, truestage};
+use crate::programs::{Process, check_error, program, text, truestage};
 
 /// Runs of three positions from both sides; `environment` goes behind each row.
 fn data(runs: u32, scale: f64, environment: Option<&str>) -> String {
@@ -53,6 +54,36 @@ fn a_single_run_has_the_figures_that_need_no_scatter_and_no_others() {
     }
     assert!(text(&figures["not_stated"]).contains("only once"), "{figures}");
     assert_eq!(figures["conforms_to_iso_230_2"], false);
+}
+
+/// Whatever a spreadsheet makes of the file, and from wherever it comes.
+#[test]
+fn the_same_data_give_the_same_figures_from_a_pipe_and_from_any_spreadsheet() {
+    let plain = data(3, 1.0 + 1e-4, None);
+    let folder = folder(&plain);
+    let expected = truestage(folder.path(), &["iso230", "data.csv"]).with_code(0);
+    let wide: Vec<u8> = plain.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let marked = [
+        ["\u{feff}".as_bytes(), plain.as_bytes()].concat(),
+        [&[0xFF, 0xFE], &wide[..]].concat(),
+    ];
+    for bytes in marked {
+        let path = folder.path().join("marked.csv");
+        fs::write(&path, bytes).expect("there is room");
+        let input = fs::File::open(&path).expect("it was written");
+        for (words, input) in [
+            (["iso230", "marked.csv"], Stdio::null()),
+            (["iso230", "-"], input.into()),
+        ] {
+            let mut command = Command::new(program("truestage"));
+            let command = command.arg("--json").args(words).current_dir(folder.path());
+            let seen = Process::start_at(command, input).end().with_code(0);
+            assert_eq!(seen, expected, "{words:?}");
+        }
+    }
+    fs::write(folder.path().join("data.csv"), b"run,approach\n1,\xB5").expect("there is room");
+    let refused = truestage(folder.path(), &["iso230", "data.csv"]).with_code(2);
+    check_error(&refused, &["data.csv", "line 2 is not UTF-8", "save the file as CSV"]);
 }
 
 fn saved(folder: &Path, words: &[&str]) -> serde_json::Value {

@@ -14,7 +14,8 @@ use units::{Approach, Metres};
 
 use crate::config::MachineConfig;
 use crate::linear::LinearContent;
-use crate::program::data_file::{head_of, read};
+use crate::program::data_file::head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::linear::elsewhere::Elsewhere;
 use crate::program::linear::uncertainty;
 use crate::program::output::{Ended, Output};
@@ -95,7 +96,7 @@ impl MeasuredBy {
 /// Reads a series; columns of the environment that nothing would use are refused, as nobody could tell whether the
 /// readings are corrected by them.
 fn series_of(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSeries, Failure> {
-    let series = LinearSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let series = LinearSeries::from_csv(&read(path)?, &name_of(path))?;
     match by {
         Some(by) => by.corrected(&series),
         None if series.environments().is_empty() => Ok(series),
@@ -306,9 +307,9 @@ pub(super) fn linear_axis(
 }
 
 fn hall(path: &Path, output: Output) -> Ended {
-    let series = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
+    let series = HallSeries::from_csv(&read(path)?, &name_of(path))?;
     let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
-        axis: path.display().to_string(),
+        axis: name_of(path),
         source,
     })?;
     let text = format!(

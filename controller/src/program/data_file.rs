@@ -9,16 +9,10 @@ use machine::records::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead, SCHEMA_VERSION,
 };
 
+use crate::program::data_text::name_of;
 use crate::run::utc_now;
 use crate::volumetric::VolumetricFailure;
 use crate::{Failure, config};
-
-pub(crate) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|source| Failure::File {
-        path: path.to_owned(),
-        source,
-    })
-}
 
 /// The head of a calibration of the linear `axis` made from the file `data`. The drive cannot be
 /// asked here, so its identity is what the configuration expects; with a serial number there it is
@@ -84,11 +78,7 @@ fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> R
         resolution_rad: None,
         created: utc_now(),
         program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
-        source: data
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
+        source: name_of(Path::new(data.file_name().unwrap_or_default())),
         instrument: InstrumentRecord {
             name: "measured elsewhere".into(),
             ..Default::default()

@@ -10,6 +10,7 @@ mod check;
 mod controls;
 mod data;
 mod data_file;
+mod data_text;
 mod demo;
 mod doctor;
 mod exchange;

@@ -12,7 +12,8 @@ use super::format::FormatName;
 use crate::config::{self, Loaded};
 use crate::linear::LinearContent;
 use crate::program::data::linear_axis;
-use crate::program::data_file::{head_of, read};
+use crate::program::data_file::head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::{Failure, linear};
 
@@ -127,7 +128,7 @@ fn table(args: &ImportArgs) -> Result<ErrorTable, Failure> {
         ("--comp-file-type", args.comp_file_type.is_some()),
         ("--unit", args.unit.is_some()),
     ];
-    let name = args.file.display().to_string();
+    let name = name_of(&args.file);
     let table = match args.format {
         FormatName::Csv => {
             if let Some((option, _)) = only_linuxcnc.iter().find(|it| it.1) {

@@ -12,7 +12,7 @@ use crate::linear::job::plan::PlannedPoint;
 use crate::linear::{Job, JobOperator, JobPlan, Reached};
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::data_file::read;
+use crate::program::data_text::{name_of, read};
 use crate::program::json as to_json;
 use crate::program::linear::{moved, uncertainty};
 use crate::program::operator::Terminal;
@@ -80,7 +80,7 @@ const VERB: &str = "run";
 pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output: Output) -> Ended {
     let text = read(file)?;
     let loaded = config::load(&args.config)?;
-    let job = Job::parse(&text, &file.display().to_string(), &loaded.config)?;
+    let job = Job::parse(&text, &name_of(file), &loaded.config)?;
     let store = loaded.config.machine.store();
     let plan = JobPlan::of(&job, &loaded, &store)?;
     let agreed = Agreed {

@@ -11,7 +11,7 @@ use crate::linear::ZeroPlanned;
 use crate::linear::sweep::planned;
 use crate::ports::Use;
 use crate::program::AxisArgs;
-use crate::program::data_file::read;
+use crate::program::data_text::{name_of, read};
 use crate::program::json as to_json;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::{Session, choose_axis};
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &PlanArgs, output: Output) -> Ended {
             let loaded = config::load(&args.axis.machine.config)?;
             let names = loaded.config.axis.keys().cloned().collect();
             let axis = choose_axis(names, &args.axis)?;
-            let sweep = HallSeries::from_csv(&read(path)?, &path.display().to_string())?;
+            let sweep = HallSeries::from_csv(&read(path)?, &name_of(path))?;
             let planned = planned(&loaded.config, &axis, &sweep, path)?;
             output.result(&text(&planned, &loaded.config), &value(&planned))
         }

@@ -14,7 +14,8 @@ use units::{Metres, Short};
 use crate::platform::PlatformConfig;
 use crate::platform::PlatformFailure;
 use crate::platform::{ScrewContent, ScrewMethodName};
-use crate::program::data_file::{head_of, read};
+use crate::program::data_file::head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::platform::json as to_json;
 use crate::program::show::{Changes, Show};
@@ -64,7 +65,7 @@ struct Estimated<'a> {
 }
 
 pub(crate) fn run(args: &ScrewArgs, output: Output) -> Ended {
-    let file = args.data.display().to_string();
+    let file = name_of(&args.data);
     let series = StrokeSeries::from_csv(&read(&args.data)?, &file)?;
     if args.method == Method::Patent && args.lead_mm.is_some() {
         output.note("note: the patent's method has no periodic error; --lead-mm has no effect");

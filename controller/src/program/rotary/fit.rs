@@ -13,7 +13,8 @@ use machine::records::{CalibrationRecord, short};
 use serde_json::json;
 use units::Radians;
 
-use crate::program::data_file::{read, rotary_head_of};
+use crate::program::data_file::rotary_head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::rotary::json as to_json;
 use crate::program::show::{Changes, Show};
@@ -140,7 +141,7 @@ fn plan_text(design: &Design, pair: &Design) -> String {
 }
 
 pub(crate) fn fit(args: &RotaryArgs, output: Output) -> Ended {
-    let file = args.data.display().to_string();
+    let file = name_of(&args.data);
     let series = RotarySeries::from_csv(&read(&args.data)?, &file, args.lines)?;
     let options = SolveOptions {
         reading_noise: args.reading_noise_arcsec.map(noise).transpose()?,

@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::{self, Loaded};
-use crate::program::data_file::{read, rotary_head_of};
+use crate::program::data_file::rotary_head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
@@ -52,7 +53,7 @@ impl ReadingsArgs {
     fn files(&self) -> Result<Vec<ReadingsFile>, Failure> {
         let file = |path: &PathBuf| {
             Ok(ReadingsFile {
-                name: path.display().to_string(),
+                name: name_of(path),
                 text: read(path)?,
             })
         };

@@ -13,7 +13,8 @@ use units::Radians;
 use crate::Failure;
 use crate::config;
 use crate::config::Loaded;
-use crate::program::data_file::{read, volume_head_of};
+use crate::program::data_file::volume_head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::shown;
 use crate::program::volumetric::verbs::{add_unknown, found_value, unknown_text, warmth_text};
@@ -113,7 +114,7 @@ fn of_journal(args: &VolumetricArgs) -> Result<Given, Failure> {
 
 /// Lines that were read elsewhere count as read at one warmth.
 fn of_series(args: &VolumetricArgs, config: &VolumetricConfig) -> Result<Given, Failure> {
-    let file = args.data.display().to_string();
+    let file = name_of(&args.data);
     let series = VolumeSeries::from_csv(&read(&args.data)?, &file)?;
     let (mut plan, _) = volume_plan(config, false, Vec::new())?;
     plan.lines.clear();

@@ -12,7 +12,8 @@ use units::Metres;
 use crate::config;
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::data_file::{read, volume_head_of};
+use crate::program::data_file::volume_head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::intended::nowhere;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
@@ -339,7 +340,7 @@ pub(crate) fn memory_import(args: &ImportArgs, output: Output) -> Ended {
     let text = read(&args.file)?;
     let head = volume_head_of(&loaded, memory_pointer(MemoryName::First), &args.file)?;
     let store = loaded.config.machine.store();
-    let file = args.file.display().to_string();
+    let file = name_of(&args.file);
     let kept = import(&loaded.config, &store, head, (&text, &file))?;
     let text = format!(
         "{} keeps the designed shape: all parts from now on are made with it\n{}",

@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use crate::config::MachineConfig;
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::data_file::{read, volume_head_of};
+use crate::program::data_file::volume_head_of;
+use crate::program::data_text::{name_of, read};
 use crate::program::kept::or_by_its_service;
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::reference_changes;
@@ -113,7 +114,7 @@ fn import(args: &ReferenceFile, output: Output) -> Ended {
     let store = loaded.config.machine.store();
     // Whoever corrects by references must find them there to the end.
     let _lease = Lease::take(&store, "reference import")?;
-    let file = args.file.display().to_string();
+    let file = name_of(&args.file);
     let given = given::import(&loaded.config, &store, head, (&text, &file))?;
     output.result(&given_text(&given, &file), &given_value(&given, &file))
 }
