@@ -115,6 +115,8 @@ impl Seat {
             Task::Stopping => AxisState::Stopping,
             Task::Jog(_) => AxisState::ContinuousMotion,
             Task::Run(_, RunKind::Zero) => AxisState::Homing,
+            // Its run waits for a person with his hands in the machine.
+            Task::Run(..) if power != Some(PowerState::OperationEnabled) => AxisState::Disabled,
             Task::Run(..) | Task::Motion(_) => AxisState::DiscreteMotion,
             Task::Free | Task::Power(_) => match power {
                 Some(PowerState::OperationEnabled) => AxisState::Standstill,

@@ -185,6 +185,11 @@ fn the_axis_is_off_while_somebody_is_asked_and_a_stop_by_anybody_ends_that() {
             let id = bed.run_of(RunKind::Calibrate);
             let question = bed.asked(&id);
             bed.let_time_pass(0.2);
+            let axis = bed.client.axis("c").unwrap();
+            assert_eq!(
+                (axis.state, axis.used_by.as_deref()),
+                (AxisState::Disabled, Some(&*id))
+            );
             bed.client.stop(&bert(), mode).unwrap();
             let run = bed.client.run(&id, PATIENCE).unwrap();
             assert_eq!(run.state, RunState::Stopped, "{run:?}");

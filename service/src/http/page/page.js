@@ -159,6 +159,8 @@ function showAxes(list) {
     const [low, high] = turns ? [0, 360] : [axis.soft_min.value, axis.soft_max.value];
     const at = axis.encoder ? axis.encoder.value : low;
     bar.value = (turns ? ((at % 360) + 360) % 360 : at - low) / (high - low);
+    for (const it of shown.querySelectorAll(".jogs")) it.hidden = turns;
+    if (turns) shown.querySelector(".go input").placeholder = "90deg";
     bar.title = turns ? "turns endlessly" : `${low} to ${high} ${axis.soft_min.unit}`;
     const facts = {
       zero: axis.homed ? "found" : "not found yet",
