@@ -11,7 +11,8 @@ use machine::engine::Live;
 use machine::engine::Observed;
 use machine::records::{CalibrationRecord, RecordHead};
 use mock_bus::plant::VolumetricTruth;
-use truestage::volumetric::{GeometryContent, WorkVolume};
+use truestage::for_tests::VolumetricCalibrated;
+use truestage::volumetric::{GeometryContent, WarmUp, WorkVolume};
 use truestage::volumetric::{Mover, VolumetricCorrection, VolumetricState};
 use units::{Celsius, Metres, Radians, Time};
 
@@ -171,6 +172,21 @@ impl Volume {
         good(bench.machine.start());
         good(bench.machine.volumetric().unwrap().zero());
         Self { bench }
+    }
+
+    /// A machine that `fresh` makes, just switched on, after it has calibrated itself on another day as it does: cold, and
+    /// again after `warm_up`.
+    ///
+    /// # Panics
+    /// When that fails.
+    pub fn calibrated(fresh: impl Fn() -> Self, warm_up: WarmUp) -> (Self, VolumetricCalibrated) {
+        let mut before = fresh();
+        let store = before.bench.store.clone();
+        let mut hand = before.bench.emulated.clone();
+        let made = good(before.work().calibrate(&store, warm_up, None, &mut hand));
+        let later = fresh();
+        later.inherit(&before);
+        (later, made)
     }
 
     /// Stores what `other` has stored: the same machine on another day.

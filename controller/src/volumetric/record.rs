@@ -321,11 +321,28 @@ pub struct DriftRecord {
 impl BeamRecord {
     /// How far the beam had wandered when the slide was at `position`: that of the nearest stop.
     pub(crate) fn wandered(&self, position: Metres) -> Option<[f64; 2]> {
-        let stops = self.slider[0].positions_m.iter().enumerate();
-        let off = |it: &(usize, &f64)| (it.1 - position.value()).abs();
-        let (nearest, _) = stops.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let nearest = self.nearest(position)?;
         let [first, second] = self.wandered_m.as_ref()?;
         Some([*first.get(nearest)?, *second.get(nearest)?])
+    }
+
+    /// How sure the means of the slide's detector are at the nearest stop, on average over both directions.
+    pub(crate) fn u_slide(&self, position: Metres) -> Option<Metres> {
+        let nearest = self.nearest(position)?;
+        let of = |k: usize| {
+            let all = self.slider[k].standard_uncertainties_si.as_ref();
+            all.and_then(|it| it.get(nearest)).copied()
+        };
+        let (first, second) = (of(0)?, of(1)?);
+        Some(Metres(((first * first + second * second) / 2.0).sqrt()))
+    }
+
+    fn nearest(&self, position: Metres) -> Option<usize> {
+        let stops = self.slider[0].positions_m.iter().enumerate();
+        let off = |it: &(usize, &f64)| (it.1 - position.value()).abs();
+        stops
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
+            .map(|(at, _)| at)
     }
 }
 

@@ -11,7 +11,7 @@ use core::time::Duration;
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::function::{Function, Shape};
-use compensator::volumetric::online::{Displacement, Spot, Trouble};
+use compensator::volumetric::online::{Spot, Trouble};
 use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use crate::config::MachineConfig;
@@ -247,7 +247,7 @@ impl WorkVolume<'_> {
         at: Metres,
         beam: &BeamConfig,
         seen: &[Still],
-    ) -> Result<(Displacement, Option<Displacement>), VolumetricFailure> {
+    ) -> Result<([Mean; 2], Option<[Mean; 2]>), VolumetricFailure> {
         let place = |it: DetectorConfig<'_>, what| {
             let blind = |source| VolumetricFailure::Blind {
                 axis,
@@ -255,8 +255,7 @@ impl WorkVolume<'_> {
                 what,
                 source,
             };
-            let means = place_of_beam(self.core.config, axis, it, seen, blind)?;
-            Ok::<_, VolumetricFailure>(means.map(|it| Metres(it.mean())))
+            place_of_beam(self.core.config, axis, it, seen, blind)
         };
         let slider = place(slide_of(beam)?, ON_THE_SLIDE)?;
         let end = beam.at_the_end().map(|it| place(it, AT_THE_END));

@@ -104,17 +104,8 @@ fn day_of_calibrated(seed: u64, places: usize) -> Day {
 
 /// The same of a machine that `fresh` makes: each time the same one, just switched on.
 fn day_of_made(fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
-    let mut volume = fresh();
-    let store = volume.bench.store.clone();
-    let mut hand = volume.bench.emulated.clone();
     let warm_up = WarmUp::Idle(Duration::from_secs(2 * 3600));
-    let machine = &mut volume.bench.machine;
-    let made = good(
-        machine
-            .volumetric()
-            .unwrap()
-            .calibrate(&store, warm_up, None, &mut hand),
-    );
+    let (mut later, made) = Volume::calibrated(fresh, warm_up);
     eprintln!(
         "seed {seed}: {} lines, {} readings beyond the unknowns, scatter {:.2} of what was stated, u {:.3} um",
         made.lines,
@@ -130,8 +121,6 @@ fn day_of_made(fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
         let (value, u) = (it.per_kelvin * 1e6, it.u * 1e6);
         eprintln!("  scale of {}: {value:.3} ppm/K, u {u:.3}", it.plan.axis);
     }
-    let mut later = fresh();
-    later.inherit(&volume);
     Day {
         birge: made.found.birge_ratio,
         ..work(&mut later, seed, places)

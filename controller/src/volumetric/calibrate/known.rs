@@ -14,6 +14,13 @@ use crate::volumetric::VolumetricConfig;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::settings::{model_limits, roll_max, thermal, volumetric_chain, work_volume};
 
+/// What the detectors see beyond their references, and how sure the displacements of each axis are by noise.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SeenState {
+    pub(super) state: MovingState,
+    pub(super) u_displacement: [Metres; 3],
+}
+
 /// A model without any table: only what is known otherwise.
 pub(super) struct Known {
     model: VolumetricModel,
@@ -62,7 +69,7 @@ impl Known {
     pub(super) fn without(
         &self,
         observation: &Observation,
-        state: &MovingState,
+        seen: &SeenState,
         temperatures: &[Celsius],
     ) -> Result<Reading, VolumetricFailure> {
         let Reading::Length {
@@ -74,14 +81,18 @@ impl Known {
             return Ok(observation.reading);
         };
         let (model, at) = (&self.model, observation.at);
-        let now = model.conditions(observation.tool, temperatures, state)?;
-        let seen = model.deviation(at, &now)?;
+        let now = model.conditions(observation.tool, temperatures, &seen.state)?;
         let u_seen = model.standard_uncertainty(at, &now, Metres(0.0), Radians(0.0), &[])?;
+        let u_displacement = seen.u_displacement;
+        let seen = model.deviation(at, &now)?;
         let (mut part, mut square) = (0.0, u.value() * u.value());
         for axis in Axis::ALL {
             let share = along[axis.index()];
             part += seen.along(axis).value() * share;
             square += powi(u_seen.along(axis).value() * share, 2);
+            // Each of the other two slides goes aside in this direction.
+            let others = axis.others().map(|it| u_displacement[it.index()].value());
+            square += others.iter().map(|u| powi(u * share, 2)).sum::<f64>();
         }
         Ok(Reading::Length {
             along,
@@ -147,7 +158,7 @@ mod tests {
             .map(|(it, by)| *it + Celsius(by))
             .collect();
         let reading = known
-            .without(&length(along), &MovingState::default(), &warm)
+            .without(&length(along), &SeenState::default(), &warm)
             .unwrap();
         let Reading::Length { deviation, u, .. } = reading else {
             panic!("{reading:?}")
@@ -188,6 +199,21 @@ mod tests {
         check(true, z, [0.5; 6], [1.0, 0.02_f64.hypot(0.02)]);
     }
 
+    /// Along y the slides of x and z go aside.
+    #[test]
+    fn the_noise_of_detectors_makes_a_reading_less_sure() {
+        let known = Known::new(&config(), &COLD, true).unwrap();
+        let seen = SeenState {
+            u_displacement: [0.1, 5.0, 0.3].map(Metres::from_um),
+            ..SeenState::default()
+        };
+        let reading = known.without(&length([0.0, 1.0, 0.0]), &seen, &COLD);
+        let Reading::Length { u, .. } = reading.unwrap() else {
+            panic!("it is a length")
+        };
+        assert!((u.um() - 0.02_f64.hypot(0.1).hypot(0.3)).abs() < 1e-12);
+    }
+
     #[test]
     fn tilts_are_left_as_they_were_read() {
         let known = Known::new(&config(), &COLD, false).unwrap();
@@ -201,7 +227,7 @@ mod tests {
             ..length([1.0, 0.0, 0.0])
         };
         let warm = COLD.map(|it| it + Celsius(1.0));
-        let left = known.without(&observation, &MovingState::default(), &warm);
+        let left = known.without(&observation, &SeenState::default(), &warm);
         assert_eq!(left.unwrap(), reading);
     }
 }

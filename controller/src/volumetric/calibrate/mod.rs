@@ -58,6 +58,7 @@ use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
 
+use crate::volumetric::reference::mean::Noise;
 use known::Known;
 
 /// What it is called where progress is told.
@@ -105,6 +106,8 @@ struct Session<'a> {
     beams: [Option<BeamReference>; 3],
     rolls: [Option<Function<Radians>>; 3],
     known: Known,
+    /// How single samples of the detector at the end of each beam scatter.
+    end_noise: [Noise; 3],
     thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
     /// All lines, as in the plan.
@@ -274,6 +277,7 @@ impl WorkVolume<'_> {
             beams,
             rolls,
             known,
+            end_noise: Default::default(),
             thermometry,
             operator,
             lines,
