@@ -5,9 +5,9 @@
 
 use core::time::Duration;
 
-use compensator::volumetric::online::Spot;
+use compensator::volumetric::online::{Spot, Unplaced};
 use drivers::device::{DeviceError, PoseInstrument};
-use units::{Metres, Time};
+use units::Time;
 
 /// How long a camera that failed is left alone: what it lacks is seldom there at once.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -71,8 +71,7 @@ impl Lookout {
             State::Resting => {}
             State::Looking | State::Starting => match camera.poll_outcome()? {
                 Ok(()) if self.state == State::Starting => {}
-                Ok(()) => self.shown(camera.asked(), camera.pose().map(|it| [it.x, it.y])),
-                Err(DeviceError::NoGoodPicture { .. }) => self.shown(camera.asked(), None),
+                Ok(()) | Err(DeviceError::NoGoodPicture { .. }) => self.shown(camera),
                 Err(error) => {
                     let again = now + PAUSE;
                     self.state = State::Failed { again };
@@ -89,7 +88,14 @@ impl Lookout {
         None
     }
 
-    const fn shown(&mut self, at: Time, place: Option<[Metres; 2]>) {
+    /// Of several spots a job shows the one that it likes best, which need not be the beam's.
+    fn shown(&mut self, camera: &dyn PoseInstrument) {
+        let place = match (camera.found(), camera.pose()) {
+            (spots @ 2.., _) => Err(Unplaced::Several(spots)),
+            (_, Some(pose)) => Ok([pose.x, pose.y]),
+            (_, None) => Err(Unplaced::NoSpot),
+        };
+        let at = camera.asked();
         self.newest = Some(Spot { at, place });
         self.is_told = false;
     }

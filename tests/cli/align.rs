@@ -113,6 +113,14 @@ fn each_detector_says_what_is_wrong_with_its_beam_and_which_way_it_is() {
     }
 }
 
+/// A reflection beside the spot on the slide of x, as bright as half of the beam.
+const REFLECTED: &str = r#"
+[[faults]]
+from_s = 0.0
+duration_s = 1000.0
+fault = { kind = "reference_beam_reflected", axis = 0, at = "slide", by_um = [80.0, 0.0], share = 0.5 }
+"#;
+
 /// The detectors of x are cameras on serial lines; its beam is blocked behind the slide.
 #[test]
 fn cameras_say_where_the_spot_is_or_that_there_is_none() {
@@ -139,6 +147,24 @@ fn cameras_say_where_the_spot_is_or_that_there_is_none() {
         assert_eq!(end["state"], "no_spot", "{end}");
         assert!(end["readings"][0]["place"].is_null(), "{end}");
     }
+}
+
+#[test]
+fn a_reflection_beside_the_spot_is_told_and_taken_for_no_place() {
+    let live = Live::shaped(
+        Rig::Pty,
+        |text| with_spot_cameras(&text, &["x"]),
+        |text| with_emulated_spot_cameras(&text, &["x"]) + REFLECTED,
+    );
+    let words = ["align", "machine.toml", "--for", "2s"];
+    let (printed, code) = ended(start(&mut live.command(&words), Stdio::piped()));
+    assert_eq!(code, Some(0), "{printed}");
+    let seen = objects(&printed).pop().expect("one a second");
+    let slide = detector(&seen, "x slide");
+    assert_eq!(slide["state"], "several_spots", "{slide}");
+    assert!(text(&slide["trouble"]).contains("2 spots"), "{slide}");
+    assert!(slide["readings"][0]["place"].is_null(), "{slide}");
+    assert_eq!(detector(&seen, "x end")["state"], "good", "{seen}");
 }
 
 /// One object a second; Ctrl-C and the end of the time are both a good end.

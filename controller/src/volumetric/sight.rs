@@ -266,7 +266,7 @@ impl Watched {
                     })
                 };
                 let place = camera.place(&spot).map(|it| it.map(Metres::value));
-                self.take(place, spot.place.map(nearest));
+                self.take(place, spot.place.ok().map(nearest));
             }
             Watch::Roll(reader) => match reader.look(observed) {
                 Ok((roll, at)) => {

@@ -357,6 +357,10 @@ pub trait PoseInstrument: Device {
 
     /// When the last picture was asked for, whether it was good or not.
     fn asked(&self) -> Time;
+
+    /// How many targets the last picture showed, whether it was good or not: more than there are is a reflection, or
+    /// something that looks like one.
+    fn found(&self) -> u32;
 }
 
 /// Where a body was seen, in the machine's frame, from where the instrument was taught.

@@ -12,6 +12,8 @@ use wire::canopen::sdo::{Expedited, SdoRequest};
 use wire::canopen::sync::emit_sync;
 use wire::canopen::{Function, NodeId, Object};
 
+use crate::plant::BeamPlace;
+
 mod plan;
 
 #[cfg(test)]
@@ -173,6 +175,14 @@ pub enum Fault {
     ReferenceBeamBright { axis: usize },
     /// Somebody has knocked the source of a reference beam aside.
     ReferenceBeamKnocked { axis: usize, by_um: f64 },
+    /// One of the detectors of a reference beam also sees a reflection of it, so far beside in both directions across,
+    /// with this share of its light.
+    ReferenceBeamReflected {
+        axis: usize,
+        at: BeamPlace,
+        by_um: [f64; 2],
+        share: f64,
+    },
     /// The fringe counter slips.
     FringeJump { half_wavelengths: i64 },
     /// The cameras' marks are not there.

@@ -2,7 +2,7 @@
 //!
 //! Sources: those of [`wire::in_sight`]. It does one thing after the other: what is
 //! said while it takes and judges a picture waits in its input buffer, and what does not fit
-//! into that is lost. Its job looks for all marks, works out the pose that takes them from
+//! into that is lost. Its job looks for all marks, or for the spots of a beam, of which it tells the brightest, works out the pose that takes them from
 //! where they were taught to where they are (the rigid motion of least squares: S. Umeyama,
 //! IEEE Trans. PAMI 13 (1991) 376, without scale), and puts count, judgement, pose and score
 //! into one cell of text.
@@ -61,6 +61,8 @@ pub struct InSightControllerConfig {
     pub processing_ms: f64,
     /// See there.
     pub processing_jitter_ms: f64,
+    /// How many marks or spots the job looks for at most.
+    pub number_to_find: usize,
     /// A mark with a lower score (0 to 100) is not found.
     pub find_threshold: f64,
     /// A picture with a lower score is judged bad.
@@ -101,6 +103,7 @@ impl Default for InSightControllerConfig {
             exposure_ms: 8.0,
             processing_ms: 35.0,
             processing_jitter_ms: 6.0,
+            number_to_find: 10,
             find_threshold: 25.0,
             accept_threshold: 60.0,
             quirks: InSightQuirks::default(),
@@ -309,13 +312,19 @@ impl InSightControllerNode {
             .iter()
             .flatten()
             .filter(|mark| mark.likeness * 100.0 >= self.config.find_threshold)
+            .take(self.config.number_to_find)
             .copied()
             .collect();
         let count = next_count(self.result.count);
-        let score = found.iter().map(|mark| mark.likeness * 100.0);
+        let (all, told) = match self.config.looks_at {
+            Scene::Marks => (marks.len(), found.len()),
+            Scene::Beam { .. } => (1, 1),
+        };
+        let used = &found[..told.min(found.len())];
+        let score = used.iter().map(|mark| mark.likeness * 100.0);
         let score = score.fold(100.0, f64::min);
         let least = self.config.looks_at.least();
-        if found.len() < marks.len() || found.len() < least {
+        if found.len() < all || found.len() < least {
             return Inspection {
                 count,
                 found: found.len() as u32,
@@ -323,7 +332,7 @@ impl InSightControllerNode {
                 ..NO_PICTURE
             };
         }
-        let [x_m, y_m, angle] = motion(&found);
+        let [x_m, y_m, angle] = motion(used);
         Inspection {
             count,
             found: found.len() as u32,
@@ -543,6 +552,37 @@ mod tests {
         assert!(turn.abs() < 2.0, "{seen:?} {pose:?}");
         rig.ask("SW8");
         assert_eq!(rig.result().count, 2);
+    }
+
+    /// The brighter one is the job's first: with a reflection that is brighter than the beam it is the wrong one, and a
+    /// job that looks for one spot only does not even say so.
+    #[test]
+    fn of_several_spots_the_job_tells_the_brightest_and_how_many_there_are() {
+        let spot = |um: f64, likeness: f64| {
+            Some(Mark {
+                place_m: [um * 1e-6, 0.0],
+                built_m: [0.0; 2],
+                likeness,
+            })
+        };
+        let mut config = InSightControllerConfig {
+            looks_at: Scene::Beam {
+                axis: 0,
+                at: crate::plant::BeamPlace::Slide,
+            },
+            ..InSightControllerConfig::default()
+        };
+        let judge = |config: &InSightControllerConfig, marks: &[Option<Mark>]| {
+            let it = InSightControllerNode::new(config, 1, "eye").judge(marks);
+            (it.found, it.judged_ok, it.x)
+        };
+        let both = [spot(80.0, 0.97), spot(3.0, 0.9)];
+        assert_eq!(judge(&config, &both), (2, true, 80.0));
+        assert_eq!(judge(&config, &[both[1]]), (1, true, 3.0));
+        assert_eq!(judge(&config, &[both[0], spot(3.0, 0.2)]), (1, true, 80.0));
+        assert_eq!(judge(&config, &[]), (0, false, 0.0));
+        config.number_to_find = 1;
+        assert_eq!(judge(&config, &both), (1, true, 80.0));
     }
 
     #[test]

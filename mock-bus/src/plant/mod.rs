@@ -38,6 +38,7 @@ pub use platform::{PlatformTruth, Pose};
 pub use table::{Sight, TableTruth};
 pub use thermal::Environment;
 pub use truth::Truth;
+pub(crate) use volumetric::Reflection;
 pub use volumetric::{LineOptics, LineSetUp, LineTruth, VolumetricTruth};
 
 use analog::Input;
@@ -283,14 +284,16 @@ impl Plant {
         }
     }
 
-    /// The pictures are taken: each mark, `None` where it is not in its picture. A beam has one, its spot.
+    /// The pictures are taken: each mark, `None` where it is not in its picture. Of a beam it is the spots that are there,
+    /// the brightest first.
     pub fn close_shutter(&mut self, scene: Scene) -> Vec<Option<Mark>> {
         let now = self.now;
         match scene {
             Scene::Marks => self.camera.close_shutter(self.pose()),
             Scene::Beam { axis, at } => {
                 let volumetric = self.machine.of_mut::<Volumetric>();
-                vec![volumetric.and_then(|it| it.close_shutter(axis, at, now))]
+                let spots = volumetric.map(|it| it.close_shutter(axis, at, now));
+                spots.into_iter().flatten().map(Some).collect()
             }
         }
     }

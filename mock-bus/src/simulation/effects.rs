@@ -6,7 +6,7 @@ use wire::can::{BusError, BusErrorClass, ControllerProblem};
 use super::{Event, Link, Simulation};
 use crate::bus::Sender;
 use crate::fault::Fault;
-use crate::plant::{Beam, Environment, InputFault, Target};
+use crate::plant::{Beam, Environment, InputFault, Reflection, Target};
 
 /// Sensors that have lost their calibration memory show such things.
 const IMPOSSIBLE: Environment = Environment {
@@ -79,6 +79,16 @@ impl Simulation {
             Fault::ReferenceBeamKnocked { axis, by_um } => {
                 let by_m = if on { by_um * 1e-6 } else { 0.0 };
                 plant.trouble_beam(axis, |beam| beam.knocked_m = by_m);
+            }
+            Fault::ReferenceBeamReflected {
+                axis,
+                at,
+                by_um,
+                share,
+            } => {
+                let off_m = by_um.map(|um| um * 1e-6);
+                let reflection = on.then_some(Reflection { off_m, share });
+                plant.trouble_beam(axis, |beam| *beam.reflection_mut(at) = reflection);
             }
             Fault::TargetAbsent => plant.set_target(if on { Target::Absent } else { Target::Good }),
             Fault::TargetCovered => {

@@ -369,6 +369,19 @@ fn every_fault_of_a_beam_shows_at_its_module_and_ends() {
         let right = |v: [i16; 8]| i32::from(v[0]) + i32::from(v[3]);
         (right(during) - right(before) - 6_400).abs() < 500
     });
+    // A fifth of the light 500 µm beside, where 84 % of it are on the one side: a hundredth of the sum and more.
+    let reflected = Fault::ReferenceBeamReflected {
+        axis: 2,
+        at: crate::plant::BeamPlace::End,
+        by_um: [500.0, 0.0],
+        share: 0.2,
+    };
+    check_fault(reflected, 13, |before, during| {
+        let right = |v: [i16; 8]| i32::from(v[4]) + i32::from(v[7]);
+        let left = |v: [i16; 8]| i32::from(v[5]) + i32::from(v[6]);
+        let own = (during[0] - before[0]).abs() < 100;
+        own && right(during) - right(before) > 2 * (left(during) - left(before))
+    });
     check_fault(Fault::InputStuck { channel: 8 }, 12, |_, _| true);
     check_fault(Fault::InputOpen { channel: 27 }, 14, |_, during| {
         during[3] == i16::MIN

@@ -6,6 +6,7 @@ use core::time::Duration;
 use compensator::volumetric::online::{FeedStatus, Memories, Trouble};
 use machine::engine::{Lack, Live, Source, Validity};
 use mock_bus::fault::{Fault, FaultConfig};
+use mock_bus::plant::BeamPlace;
 use tests::volume::{
     Frame, Off, Volume, by_short_ways, calm, good, largest, percentile_95, point_mm, quick,
     random_places, spread,
@@ -213,10 +214,10 @@ fn lack(live: &Live) -> Option<Lack> {
     }
 }
 
-/// The x beam is blocked for two seconds, then the camera on its slide is without power for three: all are told by what
+/// The x beam is blocked for two seconds, has a reflection beside it for two, then the camera on its slide is without power for three: all are told by what
 /// they are, and all are over when they are over.
 #[test]
-fn a_camera_that_sees_nothing_is_told_from_one_that_is_silent_and_both_come_back() {
+fn a_camera_that_sees_nothing_or_too_much_is_told_from_one_that_is_silent_and_all_come_back() {
     let mut volume = known(61_010);
     let (mut mover, _) = volume.corrected();
     let there = point_mm([250.0, 200.0, 150.0]);
@@ -224,6 +225,12 @@ fn a_camera_that_sees_nothing_is_told_from_one_that_is_silent_and_both_come_back
     let blocked = Fault::ReferenceBeamBlocked {
         axis: 0,
         behind_slide: false,
+    };
+    let reflected = Fault::ReferenceBeamReflected {
+        axis: 0,
+        at: BeamPlace::Slide,
+        by_um: [60.0, -20.0],
+        share: 1.2,
     };
     let dead = Fault::PowerLoss {
         node: "slide_x".into(),
@@ -234,6 +241,7 @@ fn a_camera_that_sees_nothing_is_told_from_one_that_is_silent_and_both_come_back
             2,
             (|it| it == Trouble::Unseen) as fn(Trouble) -> bool,
         ),
+        (reflected, 2, |it| it == Trouble::Several { spots: 2 }),
         (dead, 3, |it| matches!(it, Trouble::Stale { .. })),
     ] {
         let text = format!("{fault:?}");

@@ -169,7 +169,7 @@ fn a_picture_counts_once() {
     // A picture every 70 ms, heard every 10 ms.
     let mut hear = |cycle: u32, seen_um: f64| {
         let at = |cycle: u32| Time::from_seconds(f64::from(cycle) * CYCLE);
-        let (place, asked) = (Some([um(seen_um), um(0.0)]), at(cycle / 7 * 7));
+        let (place, asked) = (Ok([um(seen_um), um(0.0)]), at(cycle / 7 * 7));
         let shown = Shown::Camera(Spot { at: asked, place });
         let none = [Metres(0.0); 2];
         let given = monitor.advance(

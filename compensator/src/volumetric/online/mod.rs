@@ -60,7 +60,7 @@ pub use offset::{Offset, OffsetLimits};
 pub use reference::{BeamDrift, BeamReference, DriftError};
 pub use roll::{Roll, RollError, RollOptics};
 pub use roll_monitor::RollMonitor;
-pub use spot::{Spot, SpotCamera, SpotSettings};
+pub use spot::{Spot, SpotCamera, SpotSettings, Unplaced};
 pub use stuck::StuckWatch;
 pub use temperature::{TemperatureChannel, TemperatureSettings};
 pub use trouble::Trouble;

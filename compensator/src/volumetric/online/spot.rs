@@ -4,7 +4,7 @@
 //! its picture; what comes here is a place, some times a second, of the moment at which the picture was asked for.
 //! Between two pictures nothing is known anew: [`SpotCamera::repeats`] says so, and nobody counts a picture twice.
 //!
-//! Absent: more than one spot, the shape of it, errors of the lens.
+//! Absent: which of several spots is the beam's ([`Unplaced::Several`]), the shape of a spot, errors of the lens.
 
 use core::time::Duration;
 
@@ -30,8 +30,26 @@ pub struct SpotSettings {
 pub struct Spot {
     /// When it was asked for.
     pub at: Time,
-    /// Where the spot is; `None` where the camera finds none that it accepts.
-    pub place: Option<[Metres; 2]>,
+    /// Where the spot is, or why that cannot be said.
+    pub place: Result<[Metres; 2], Unplaced>,
+}
+
+/// Why a picture tells no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unplaced {
+    /// The camera finds no spot that it accepts.
+    NoSpot,
+    /// It finds so many, and only one of them is the beam's: the others are reflections.
+    Several(u32),
+}
+
+impl From<Unplaced> for Trouble {
+    fn from(unplaced: Unplaced) -> Self {
+        match unplaced {
+            Unplaced::NoSpot => Self::Unseen,
+            Unplaced::Several(spots) => Self::Several { spots },
+        }
+    }
 }
 
 /// A camera: pictures in, places out.
@@ -100,9 +118,9 @@ impl SpotCamera {
     /// What a picture says by itself.
     ///
     /// # Errors
-    /// When it shows no spot, or one beyond the field.
+    /// When it shows no spot, several, or one beyond the field.
     pub fn place(&self, spot: &Spot) -> Result<[Metres; 2], Trouble> {
-        let place = spot.place.ok_or(Trouble::Unseen)?;
+        let place = spot.place?;
         for (seen, (low, high)) in place.into_iter().zip(self.settings.field) {
             if !(seen >= low && seen <= high) {
                 return Err(Trouble::BesideField { seen, low, high });
@@ -136,7 +154,7 @@ mod tests {
     fn spot(at: u64, place: [f64; 2]) -> Spot {
         Spot {
             at: ms(at),
-            place: Some(place.map(um)),
+            place: Ok(place.map(um)),
         }
     }
 
@@ -161,9 +179,15 @@ mod tests {
         let mut camera = SpotCamera::new(settings()).unwrap();
         let dark = Spot {
             at: ms(5),
-            place: None,
+            place: Err(Unplaced::NoSpot),
         };
         assert_eq!(camera.read(ms(10), Some(&dark)), Err(Trouble::Unseen));
+        let reflected = Spot {
+            at: ms(6),
+            place: Err(Unplaced::Several(2)),
+        };
+        let refused = camera.read(ms(10), Some(&reflected));
+        assert_eq!(refused, Err(Trouble::Several { spots: 2 }));
         let beside = camera.read(ms(20), Some(&spot(15, [0.0, 300.5])));
         assert!(
             matches!(beside, Err(Trouble::BesideField { seen, .. }) if seen == um(300.5)),

@@ -68,6 +68,15 @@ pub enum Trouble {
     /// The camera found no spot that it accepts.
     #[error("the camera finds no spot in its picture: is the beam blocked, or beside the field?")]
     Unseen,
+    /// The camera found more than the beam's spot.
+    #[error(
+        "the camera finds {spots} spots in its picture, and nothing says which one is the beam's: is there a \
+         reflection beside it?"
+    )]
+    Several {
+        /// How many.
+        spots: u32,
+    },
     /// The spot is beyond what the camera is used for.
     #[error(
         "the spot is outside the camera's field: {:.1} um, from {:.1} to {:.1} um expected",

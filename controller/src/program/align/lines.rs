@@ -14,6 +14,7 @@ pub(super) const fn words(trouble: &Trouble) -> (&'static str, &'static str) {
         Trouble::Saturated { .. } | Trouble::AtEnd { .. } => ("TOO BRIGHT", "too_bright"),
         Trouble::Beside { .. } | Trouble::BesideField { .. } => ("BESIDE", "beside"),
         Trouble::Unseen => ("NO SPOT", "no_spot"),
+        Trouble::Several { .. } => ("REFLECTED", "several_spots"),
         Trouble::Stale { .. } => ("NO SAMPLES", "stale"),
         Trouble::Roll(_) => ("NO ROLL", "no_roll"),
         Trouble::Stuck { .. } => ("STUCK", "stuck"),

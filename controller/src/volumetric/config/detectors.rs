@@ -215,7 +215,8 @@ pub(crate) const PICTURE_PERIODS_MAX: usize = 255;
 /// A camera that sees the spot of a beam behind a beam splitter (CN1214003A, claim 10).
 ///
 /// It takes one picture after the other as long as SYNC runs; what a picture shows counts for where the axis was
-/// when the picture was asked for. Its job finds one target, the spot. Turn its frame with `rotation_deg` and `mirrored`
+/// when the picture was asked for. Its job finds one target, the spot; let it look for more than one, since a picture in
+/// which it finds several, reflections, is refused. Turn its frame with `rotation_deg` and `mirrored`
 /// of its section, so that x and y are the first and second direction, the other two axes in the order x, y, z. The
 /// slider's place is that of the *slide* (a slide that goes one way sees its spot go the other way: turned by 180
 /// degrees), that of the end camera is the *beam's*. How uncertain a place is says the beam's `standard_uncertainty_um`, or

@@ -77,7 +77,7 @@ fn between((from, start): (Time, Point), (to, end): (Time, Point), when: Time) -
 
 #[cfg(test)]
 mod tests {
-    use compensator::volumetric::online::{Sample, Spot};
+    use compensator::volumetric::online::{Sample, Spot, Unplaced};
     use units::Volts;
 
     use super::*;
@@ -104,7 +104,7 @@ mod tests {
         let seen = |trail: &Trail, at: f64| {
             let shown = Shown::Camera(Spot {
                 at: ms(at),
-                place: None,
+                place: Err(Unplaced::NoSpot),
             });
             trail.position(Axis::X, Some(&shown), x_mm(-1.0)).mm()
         };

@@ -76,6 +76,8 @@ pub struct InSight {
     picture_due: Time,
     /// The picture before the one that is awaited.
     count: u32,
+    /// How many targets the last picture showed.
+    found: u32,
     lines: LineAssembler,
     garbage_in_a_row: u64,
     info: Vec<String>,
@@ -114,6 +116,7 @@ impl InSight {
             asked: Time::ZERO,
             picture_due: Time::ZERO,
             count: 0,
+            found: 0,
             lines: LineAssembler::new(TERMINATOR, LINE_MAX),
             garbage_in_a_row: 0,
             info: Vec::new(),
@@ -302,6 +305,7 @@ impl InSight {
             );
         }
         self.counts.pictures += 1;
+        self.found = picture.found;
         let Work::Measuring(measurement) = &mut self.work else {
             return;
         };
@@ -476,6 +480,10 @@ impl PoseInstrument for InSight {
 
     fn asked(&self) -> Time {
         self.asked
+    }
+
+    fn found(&self) -> u32 {
+        self.found
     }
 }
 

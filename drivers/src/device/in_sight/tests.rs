@@ -159,6 +159,23 @@ fn a_pose_is_fenced_triggered_and_read_in_si_units() {
     assert_eq!(pose.standard_deviation.0, Metres::ZERO);
 }
 
+/// More than there are to find: whoever looks for one spot must know. A picture that was judged bad says it, too.
+#[test]
+fn how_many_targets_the_last_picture_showed_is_told_whether_it_was_good_or_not() {
+    for (judged, is_good) in [(1, true), (0, false)] {
+        let mut bench = Bench::started(41);
+        bench.device.settings.rejects_max = 0;
+        bench.begin(1);
+        bench.answers(&["1", "uvw.job"]);
+        bench.result(41);
+        bench.answer("1");
+        let picture = format!("42,3,{judged},1.500,-2.000,10.000,95.000");
+        bench.answers(&["1", &picture]);
+        assert_eq!(bench.outcome().unwrap().is_ok(), is_good);
+        assert_eq!(bench.device.found(), 3);
+    }
+}
+
 #[test]
 fn several_exposures_are_averaged_with_their_scatter() {
     let mut bench = Bench::measuring(7, 3);

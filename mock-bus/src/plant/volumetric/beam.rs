@@ -12,6 +12,8 @@
 //!
 //! A camera may stand in a detector's place ([`SpotCamera`]); it sees the same spot.
 //!
+//! A reflection is a second spot: quadrants add its light to that of the beam's own.
+//!
 //! Absent: dead zones between quadrants, stray light, clipping of the spot.
 
 use core::f64::consts::{SQRT_2, TAU};
@@ -21,6 +23,7 @@ use units::portable::sin;
 
 use super::config::BeamConfig;
 use super::guide::Motion;
+use super::reflection::Reflection;
 use super::rigid::{Rotation, Vector, add, minus};
 use super::spot::SpotCamera;
 use crate::plant::picture::{BeamPlace as Place, Mark};
@@ -60,6 +63,22 @@ pub(crate) struct BeamTrouble {
     pub(crate) bright: bool,
     /// Somebody has knocked the source sideways, in both directions across.
     pub(crate) knocked_m: f64,
+    /// What the detector on the slide sees besides, and that at the end.
+    reflections: [Option<Reflection>; 2],
+}
+
+impl BeamTrouble {
+    const fn index(place: Place) -> usize {
+        match place {
+            Place::Slide => 0,
+            Place::End => 1,
+        }
+    }
+
+    /// What a detector sees besides the beam.
+    pub(crate) const fn reflection_mut(&mut self, place: Place) -> &mut Option<Reflection> {
+        &mut self.reflections[Self::index(place)]
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -182,6 +201,10 @@ impl Beam {
         self.config.turbulence_um * 1e-6 * share
     }
 
+    const fn reflection(&self, place: Place) -> Option<Reflection> {
+        self.trouble.reflections[BeamTrouble::index(place)]
+    }
+
     const fn detector_mut(&mut self, place: Place) -> &mut Detector {
         match place {
             Place::Slide => &mut self.slide,
@@ -209,12 +232,13 @@ impl Beam {
         position_m: f64,
         motion: (&Motion, [usize; 2]),
         now: Time,
-    ) -> Option<Mark> {
+    ) -> Vec<Mark> {
         let spot = self.spot_m(place, position_m, motion, now);
         let (light, turbulence_m) = (self.light(place, now), self.turbulence_m(place, position_m));
+        let reflection = self.reflection(place);
         let detector = self.detector_mut(place);
         let spot = detector.off_middle(spot);
-        detector.camera.close(spot, light, turbulence_m)
+        detector.camera.close(spot, light, turbulence_m, reflection)
     }
 
     /// Looks at a detector, the first time at this moment.
@@ -228,8 +252,9 @@ impl Beam {
         let spot = self.spot_m(place, position_m, motion, now);
         let light_v = self.light(place, now) * self.config.sum_v;
         let turbulence_m = self.turbulence_m(place, position_m);
+        let reflection = self.reflection(place);
         let detector = self.detector_mut(place);
-        let volts = detector.quadrants(spot, turbulence_m);
+        let volts = detector.quadrants(spot, turbulence_m, reflection);
         let volts = volts.map(|it| it * light_v);
         detector.seen = Seen { at: now, volts };
         volts
@@ -258,12 +283,29 @@ impl Detector {
         core::array::from_fn(|k| spot_m[k] - self.mounting_m[k])
     }
 
-    /// The share of the light on A, B, C and D.
-    fn quadrants(&mut self, spot_m: [f64; 2], turbulence_m: f64) -> [f64; 4] {
-        let ratio = self.off_middle(spot_m).map(|off_m| {
-            let trembles_m = turbulence_m * self.turbulence.gaussian();
-            erf(SQRT_2 * (off_m + trembles_m) / self.radius_m)
-        });
+    /// The light on A, B, C and D, by that of the beam.
+    fn quadrants(
+        &mut self,
+        spot_m: [f64; 2],
+        turbulence_m: f64,
+        reflection: Option<Reflection>,
+    ) -> [f64; 4] {
+        let own_m = self
+            .off_middle(spot_m)
+            .map(|off_m| off_m + turbulence_m * self.turbulence.gaussian());
+        let mut light = self.shares(own_m);
+        if let Some(Reflection { off_m, share }) = reflection {
+            let beside = self.shares([0, 1].map(|k| own_m[k] + off_m[k]));
+            for (light, beside) in light.iter_mut().zip(beside) {
+                *light += share * beside;
+            }
+        }
+        light
+    }
+
+    /// The shares of a spot's light on A, B, C and D.
+    fn shares(&self, spot_m: [f64; 2]) -> [f64; 4] {
+        let ratio = spot_m.map(|off_m| erf(SQRT_2 * off_m / self.radius_m));
         let share =
             |first: f64, second: f64| (1.0 + first * ratio[0]) * (1.0 + second * ratio[1]) / 4.0;
         [
@@ -387,6 +429,23 @@ mod tests {
         let mut beam = Beam::new(&still(), 500.0, 0, 1);
         beam.trouble.bright = true;
         assert_eq!(quadrants(&mut beam, Place::Slide, &motion), [4.0; 4]);
+    }
+
+    /// A tenth of the light, a tenth of the radius beside: a hundredth less of eleven tenths.
+    #[test]
+    fn a_reflection_draws_a_detector_of_quadrants_towards_itself() {
+        let mut beam = Beam::new(&still(), 500.0, 0, 1);
+        let radius_m = beam.config.spot_radius_mm * 1e-3;
+        *beam.trouble.reflection_mut(Place::Slide) = Some(Reflection {
+            off_m: [0.1 * radius_m, 0.0],
+            share: 0.1,
+        });
+        let motion = Motion::default();
+        let [y, z] = ratios(quadrants(&mut beam, Place::Slide, &motion));
+        let expected = erf(SQRT_2 * 0.1) * 0.1 / 1.1;
+        assert!((y - expected).abs() < 1e-12 && z.abs() < 1e-12, "{y} {z}");
+        let end = quadrants(&mut beam, Place::End, &motion);
+        assert_eq!(end, [2.0; 4], "only the slide's splitter throws it back");
     }
 
     /// The beam that swings about its source is off by the share of the way.

@@ -24,6 +24,7 @@ mod heat;
 mod laser;
 #[cfg(test)]
 mod laser_tests;
+mod reflection;
 mod rigid;
 mod roll;
 mod slide;
@@ -37,6 +38,7 @@ use units::Time;
 pub(crate) use beam::BeamTrouble;
 pub(super) use laser::Sighting;
 pub use laser::{LineOptics, LineSetUp};
+pub(crate) use reflection::Reflection;
 pub use truth::{ErrorMotion, LineTruth, Point, VolumetricTruth};
 
 use super::config::InterferometerConfig;
@@ -220,9 +222,12 @@ impl Volumetric {
         self.beams[axis].open_shutter(place, scale_m, (&motion, across(axis)), now);
     }
 
-    /// It closes its shutter: the spot in its picture.
-    pub(super) fn close_shutter(&mut self, axis: usize, place: Place, now: Time) -> Option<Mark> {
-        let scale_m = self.slides.get(axis)?.scale_m(now);
+    /// It closes its shutter: the spots in its picture, the brightest first.
+    pub(super) fn close_shutter(&mut self, axis: usize, place: Place, now: Time) -> Vec<Mark> {
+        let Some(slide) = self.slides.get(axis) else {
+            return Vec::new();
+        };
+        let scale_m = slide.scale_m(now);
         let motion = self.motion(axis, scale_m, now);
         self.beams[axis].close_shutter(place, scale_m, (&motion, across(axis)), now)
     }

@@ -1,4 +1,4 @@
-//! What a camera in a detector's place sees of a beam: one spot.
+//! What a camera in a detector's place sees of a beam: one spot, and one more where there is a reflection.
 //!
 //! Its two directions are those across the beam. It is mounted off its middle like a detector of quadrants, sees the spot
 //! where it was in the middle of the exposure, and hardly knows it where it is so bright that the picture burns out.
@@ -6,6 +6,7 @@
 //! Absent: errors of scale and lens, which are below its noise over the way that the spot goes.
 
 use super::config::BeamConfig;
+use super::reflection::Reflection;
 use crate::plant::picture::Mark;
 use crate::random::Stream;
 
@@ -14,6 +15,8 @@ const LIKENESS_BEST: f64 = 0.97;
 /// One that is twice as bright burns out its picture.
 const LIKENESS_BRIGHT: f64 = 0.4;
 const BRIGHT: f64 = 1.5;
+/// One with less light than this drowns in the picture's noise, the more the less it has.
+const FAINT: f64 = 0.2;
 
 #[derive(Clone, Debug)]
 pub(super) struct SpotCamera {
@@ -40,13 +43,14 @@ impl SpotCamera {
         self.opened_m = Some(spot_m);
     }
 
-    /// The shutter closes; `None` where no spot is in the picture.
+    /// The shutter closes: the spots in the picture, the brightest first.
     pub(super) fn close(
         &mut self,
         spot_m: [f64; 2],
         light: f64,
         turbulence_m: f64,
-    ) -> Option<Mark> {
+        reflection: Option<Reflection>,
+    ) -> Vec<Mark> {
         let opened_m = self.opened_m.take().unwrap_or(spot_m);
         // Drawn in any case: a dark picture does not shift the noise of the next one.
         let place_m = [0, 1].map(|k| {
@@ -54,19 +58,30 @@ impl SpotCamera {
             let noise_m = self.noise_m * self.noise.gaussian();
             f64::midpoint(opened_m[k], spot_m[k]) + trembles_m + noise_m
         });
-        let is_beside = place_m.iter().any(|it| it.abs() > self.field_m);
-        if light <= 0.0 || is_beside {
-            return None;
-        }
-        let likeness = if light > BRIGHT {
-            LIKENESS_BRIGHT
-        } else {
-            LIKENESS_BEST
-        };
-        Some(Mark {
+        let beside =
+            reflection.map(|it| ([0, 1].map(|k| place_m[k] + it.off_m[k]), light * it.share));
+        let mut spots: Vec<([f64; 2], f64)> = [(place_m, light)]
+            .into_iter()
+            .chain(beside)
+            .filter(|(place_m, light)| *light > 0.0 && self.is_in_the_field(*place_m))
+            .collect();
+        spots.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let marks = spots.into_iter().map(|(place_m, light)| Mark {
             place_m,
             built_m: [0.0; 2],
-            likeness,
-        })
+            likeness: likeness(light),
+        });
+        marks.collect()
     }
+
+    fn is_in_the_field(&self, place_m: [f64; 2]) -> bool {
+        place_m.iter().all(|it| it.abs() <= self.field_m)
+    }
+}
+
+fn likeness(light: f64) -> f64 {
+    if light > BRIGHT {
+        return LIKENESS_BRIGHT;
+    }
+    LIKENESS_BEST * (light / FAINT).min(1.0)
 }
