@@ -13,6 +13,7 @@
 //! | level | a voltage that only lines reach, about half of their height |
 //! | width | how far the table turns while a line is beyond the level |
 //! | window | cos² over four widths |
+//! | gap | a stretch of the turn of which samples were lost; a line whose window reaches into it is not told |
 
 use core::f64::consts::PI;
 
@@ -27,7 +28,8 @@ pub const SAMPLES_MIN: f64 = 8.0;
 pub const WIDTHS_APART: f64 = 4.0;
 /// The window reaches so many widths to both sides, and nothing is told of a line that lacks a part of it.
 const REACH: f64 = WIDTHS_APART / 2.0;
-/// A pulse whose width at the level is off by more than this factor is no line: dirt, a scratch, an end of the turn.
+/// A pulse whose width at the level is off by more than this factor is no line: narrower where dirt covers it, wider
+/// where a scratch lies beside it.
 const WIDTH_FACTOR: f64 = 1.5;
 /// Pulses nearer to each other than this share of the width are one.
 const SAME_SHARE: f64 = 0.125;
@@ -62,17 +64,34 @@ pub struct LineShape {
     pub sampling: Duration,
 }
 
-/// A line that was seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SignalLine {
-    /// Where the table was when it lay in the detector's middle.
-    pub position: Radians,
-    /// No sample of it was lost.
-    pub is_whole: bool,
+/// What the samples of a turn show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LinesSeen {
+    /// Where the table was when each line lay in the detector's middle, in the order of growing angles.
+    pub lines: Vec<Radians>,
+    /// Where a pulse is too wide for a line, or not alike on both sides: something lies beside the line.
+    pub wide: Vec<Radians>,
+    /// Lines here lack samples of their windows.
+    gaps: Vec<(Radians, Radians)>,
+    /// Lines between these have whole windows; `None` without samples.
+    sampled: Option<(Radians, Radians)>,
 }
 
-/// The lines in `samples`, which were taken while the table turned in one direction, in the order of growing angles.
-/// What is too wide or too narrow for a line, and what lies at an end of the samples, is left out.
+impl LinesSeen {
+    /// Whether so many samples are lacking about `at` that a line there is not told, be it in sight or not.
+    pub fn lacks(&self, at: Radians) -> bool {
+        let is_in = |(from, to): &(Radians, Radians)| at >= *from && at <= *to;
+        !self.sampled.as_ref().is_some_and(is_in) || self.gaps.iter().any(is_in)
+    }
+
+    /// Whether samples between the first and the last were lost.
+    pub const fn has_gaps(&self) -> bool {
+        !self.gaps.is_empty()
+    }
+}
+
+/// The lines in `samples`, which are in the order in which they were taken, while the table turned in one direction.
+/// What is too wide or too narrow for a line, and what lacks samples, is no line.
 ///
 /// # Example
 ///
@@ -97,20 +116,37 @@ pub struct SignalLine {
 ///     width: Radians(2e-3),
 ///     sampling: Duration::from_millis(5),
 /// };
-/// let lines = lines_in(&samples, &shape);
-/// assert_eq!(lines.len(), 1);
-/// assert!((lines[0].position.value() - 0.5003).abs() < 1e-8);
+/// let seen = lines_in(&samples, &shape);
+/// assert_eq!(seen.lines.len(), 1);
+/// assert!((seen.lines[0].value() - 0.5003).abs() < 1e-8);
+/// assert!(!seen.lacks(Radians(0.7)), "no line is there");
+///
+/// // Without what was sampled about the line, nobody knows whether there is one.
+/// let (before, after) = (&samples[..990], &samples[1010..]);
+/// let seen = lines_in(&[before, after].concat(), &shape);
+/// assert!(seen.lines.is_empty() && seen.lacks(Radians(0.5003)));
 /// ```
-pub fn lines_in(samples: &[SignalSample], shape: &LineShape) -> Vec<SignalLine> {
+pub fn lines_in(samples: &[SignalSample], shape: &LineShape) -> LinesSeen {
     let points = ascending(samples, shape);
     let width = shape.width.value();
-    let is_line = |(begin, end): &(f64, f64)| {
-        let seen = end - begin;
-        seen < width * WIDTH_FACTOR && seen * WIDTH_FACTOR > width
+    let mut seen = LinesSeen {
+        gaps: gaps(samples, shape),
+        sampled: whole_windows(&points, shape),
+        ..LinesSeen::default()
     };
-    let pulses = pulses(&points, width).into_iter().filter(is_line);
-    let lines = pulses.filter_map(|(a, b)| line_at(&points, (a + b) / 2.0, shape));
-    lines.collect()
+    for (begin, end) in pulses(&points, width) {
+        let (middle, wide) = ((begin + end) / 2.0, end - begin);
+        if wide * WIDTH_FACTOR <= width || seen.lacks(Radians(middle)) {
+            continue;
+        }
+        let is_line = wide < width * WIDTH_FACTOR;
+        match line_at(&points, middle, shape).filter(|_| is_line) {
+            Some(line) if seen.lacks(line) => {}
+            Some(line) => seen.lines.push(line),
+            None => seen.wide.push(Radians(middle)),
+        }
+    }
+    seen
 }
 
 /// How wide what is beyond the level is, in the middle of all that is; `None` when nothing is. For a person who has
@@ -125,7 +161,6 @@ pub fn width_seen(samples: &[SignalSample], shape: &LineShape) -> Option<Radians
 /// Position, and by how much the signal is beyond the level.
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    time: Time,
     at: f64,
     over: f64,
 }
@@ -133,7 +168,6 @@ struct Point {
 fn ascending(samples: &[SignalSample], shape: &LineShape) -> Vec<Point> {
     let sign = if shape.is_above { 1.0 } else { -1.0 };
     let point = |it: &SignalSample| Point {
-        time: it.at,
         at: it.position.value(),
         over: sign * (it.signal - shape.level).value(),
     };
@@ -146,6 +180,26 @@ fn ascending(samples: &[SignalSample], shape: &LineShape) -> Vec<Point> {
     }
     points.sort_by(|a, b| a.at.total_cmp(&b.at));
     points
+}
+
+/// Where lines lie whose windows reach into a stretch of which samples were lost.
+fn gaps(samples: &[SignalSample], shape: &LineShape) -> Vec<(Radians, Radians)> {
+    let longest = shape.sampling.mul_f64(GAP);
+    let reach = shape.width * REACH;
+    let pairs = samples.windows(2);
+    let lost = pairs.filter(|pair| pair[1].at.since(pair[0].at) > longest);
+    let wide = lost.map(|pair| {
+        let [a, b] = [pair[0].position, pair[1].position];
+        (a.min(b) - reach, a.max(b) + reach)
+    });
+    wide.collect()
+}
+
+/// Where lines lie whose windows are between the first and the last sample.
+fn whole_windows(points: &[Point], shape: &LineShape) -> Option<(Radians, Radians)> {
+    let (first, last) = (points.first()?, points.last()?);
+    let reach = shape.width * REACH;
+    Some((Radians(first.at) + reach, Radians(last.at) - reach))
 }
 
 /// Where what is beyond the level begins and ends.
@@ -177,7 +231,7 @@ fn pulses(points: &[Point], width: f64) -> Vec<(f64, f64)> {
 }
 
 /// The centroid under a window about itself.
-fn line_at(points: &[Point], middle: f64, shape: &LineShape) -> Option<SignalLine> {
+fn line_at(points: &[Point], middle: f64, shape: &LineShape) -> Option<Radians> {
     let width = shape.width.value();
     let reach = REACH * width;
     let mut centre = middle;
@@ -189,20 +243,7 @@ fn line_at(points: &[Point], middle: f64, shape: &LineShape) -> Option<SignalLin
             break;
         }
     }
-    if (centre - middle).abs() > width / 2.0 {
-        return None;
-    }
-    let window = within(points, centre, reach)?;
-    let longest = shape.sampling.mul_f64(GAP);
-    let apart = |pair: &[Point]| {
-        let [a, b] = [pair[0].time, pair[1].time];
-        a.since(b).max(b.since(a))
-    };
-    let is_whole = window.windows(2).all(|pair| apart(pair) <= longest);
-    Some(SignalLine {
-        position: Radians(centre),
-        is_whole,
-    })
+    ((centre - middle).abs() <= width / 2.0).then_some(Radians(centre))
 }
 
 /// The points of a window, and one more on each side; `None` at an end of all points.
@@ -271,10 +312,9 @@ mod tests {
     }
 
     fn off(samples: &[SignalSample], shape: &LineShape, true_at: f64) -> f64 {
-        let lines = lines_in(samples, shape);
+        let lines = lines_in(samples, shape).lines;
         assert_eq!(lines.len(), 1, "{lines:?}");
-        assert!(lines[0].is_whole);
-        (lines[0].position.value() - true_at).abs() / WIDTH
+        (lines[0].value() - true_at).abs() / WIDTH
     }
 
     #[test]
@@ -301,7 +341,7 @@ mod tests {
     fn dark_lines_and_a_turn_the_other_way_are_the_same() {
         let mut samples = seen(0.25, 0.0, &[0.1], gaussian);
         let bright = lines_in(&samples, &SHAPE);
-        samples.reverse();
+        turn_back(&mut samples);
         assert_eq!(lines_in(&samples, &SHAPE), bright);
         for it in &mut samples {
             it.signal = Volts(5.0) - it.signal;
@@ -323,7 +363,7 @@ mod tests {
         }
         // Half a count.
         assert!(off(&samples, &SHAPE, 0.1) < 0.04);
-        samples.reverse();
+        turn_back(&mut samples);
         assert!(off(&samples, &SHAPE, 0.1) < 0.04);
         let seen = width_seen(&samples, &SHAPE).unwrap().value() / WIDTH;
         assert!((seen - 1.0).abs() < 0.1, "{seen}");
@@ -353,22 +393,61 @@ mod tests {
         assert!((2e-5..3e-4).contains(&rms), "{rms:e}");
     }
 
+    /// The same places, passed the other way.
+    fn turn_back(samples: &mut [SignalSample]) {
+        samples.reverse();
+        for (number, it) in (0_u32..).zip(samples) {
+            it.at = Time::ZERO + number * SAMPLING;
+        }
+    }
+
     #[test]
-    fn what_is_no_line_is_left_out_and_a_lost_sample_is_told() {
+    fn what_is_no_line_is_left_out_and_what_is_beside_one_is_told() {
         let wide = |off: f64| gaussian(off / 2.0);
-        assert!(lines_in(&seen(0.25, 0.0, &[0.1], wide), &SHAPE).is_empty());
+        let seen_wide = lines_in(&seen(0.25, 0.0, &[0.1], wide), &SHAPE);
+        assert!(seen_wide.lines.is_empty() && seen_wide.wide.len() == 1);
         let speck = |off: f64| gaussian(off * 3.0);
-        assert!(lines_in(&seen(0.1, 0.0, &[0.1], speck), &SHAPE).is_empty());
-        // A scratch beside it.
-        let both = seen(0.25, 0.0, &[0.1, 0.1 + 0.6 * WIDTH], gaussian);
-        assert!(lines_in(&both, &SHAPE).is_empty());
-        let mut samples = seen(0.25, 0.0, &[0.1], gaussian);
-        let lost = samples.iter().position(|it| it.position.value() > 0.1);
-        samples.remove(lost.unwrap());
-        let lines = lines_in(&samples, &SHAPE);
-        assert_eq!(lines.len(), 1);
-        assert!(!lines[0].is_whole);
-        assert!(lines_in(&seen(0.25, 0.0, &[0.0005], gaussian), &SHAPE).is_empty());
-        assert!(lines_in(&[], &SHAPE).is_empty());
+        let specks = lines_in(&seen(0.1, 0.0, &[0.1], speck), &SHAPE);
+        assert!(specks.lines.is_empty() && specks.wide.is_empty());
+        let scratched = seen(0.25, 0.0, &[0.1, 0.1 + 0.6 * WIDTH], gaussian);
+        let scratched = lines_in(&scratched, &SHAPE);
+        assert!(scratched.lines.is_empty());
+        let [wide] = scratched.wide[..] else {
+            panic!("{scratched:?}")
+        };
+        assert!((wide.value() - 0.1 - 0.3 * WIDTH).abs() < 0.01 * WIDTH);
+        assert_eq!(lines_in(&[], &SHAPE), LinesSeen::default());
+    }
+
+    /// Of a line in the middle, one at each end: where it is, and whether it is told.
+    #[test]
+    fn a_line_that_lacks_samples_is_not_told_and_one_that_is_hidden_wholly_is_not_called_absent() {
+        let all = seen(0.25, 0.0, &[0.1], gaussian);
+        let beyond = |reach: f64| {
+            let far = move |it: &&SignalSample| (it.position.value() - 0.1).abs() > reach * WIDTH;
+            lines_in(&all.iter().filter(far).copied().collect::<Vec<_>>(), &SHAPE)
+        };
+        let mut one = all.clone();
+        one.remove(all.iter().position(|it| it.position.value() > 0.1).unwrap());
+        // One sample, the line's middle, all of its window and more.
+        for seen in [
+            lines_in(&one, &SHAPE),
+            beyond(0.4),
+            beyond(1.0),
+            beyond(5.0),
+        ] {
+            assert!(seen.lines.is_empty() && seen.wide.is_empty(), "{seen:?}");
+            assert!(seen.has_gaps() && seen.lacks(Radians(0.1)), "{seen:?}");
+            assert!(!seen.lacks(Radians(0.05)), "{seen:?}");
+        }
+        let mut back = all.clone();
+        turn_back(&mut back);
+        back.drain(..back.len() / 4);
+        let seen_back = lines_in(&back, &SHAPE);
+        assert!(!seen_back.has_gaps() && seen_back.lacks(Radians(0.16)));
+        assert_eq!(seen_back.lines.len(), 1);
+        let at_the_end = lines_in(&seen(0.25, 0.0, &[0.0005], gaussian), &SHAPE);
+        assert!(at_the_end.lines.is_empty() && at_the_end.lacks(Radians(0.0005)));
+        assert!(LinesSeen::default().lacks(Radians(0.1)));
     }
 }

@@ -77,7 +77,7 @@ pub use design::{
     Design, DesignError, harmonic_max, rms_amplification_of_a_pair, rms_amplification_of_all,
 };
 pub use line_signal::{
-    LineShape, SAMPLES_MIN, SignalLine, SignalSample, WIDTHS_APART, lines_in, width_seen,
+    LineShape, LinesSeen, SAMPLES_MIN, SignalSample, WIDTHS_APART, lines_in, width_seen,
 };
 pub use misplaced::{Misplaced, misplaced, shift_between};
 pub use periodic::{

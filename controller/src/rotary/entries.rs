@@ -66,9 +66,9 @@ pub struct SweepEntry {
     pub deviations_rad: Vec<Option<f64>>,
     /// Positions at which no line was seen.
     pub missing: Vec<u32>,
-    /// Positions at which more than one edge came.
+    /// Positions at which more than one edge came, or a pulse too wide for one line.
     pub doubled: Vec<u32>,
-    /// Positions at which an edge was overwritten before it was read.
+    /// Positions at which an edge was overwritten before it was read, or samples of a voltage were lost.
     pub overwritten: Vec<u32>,
     /// Readings near no line.
     pub strays_rad: Vec<f64>,

@@ -156,7 +156,7 @@ impl RotaryTable<'_> {
         let doubled = seldom(|it| &it.doubled, 1);
         if !doubled.is_empty() {
             say(format!(
-                "seen twice (a scratch?): {}",
+                "seen twice, or too wide (a scratch?): {}",
                 names(first, &doubled)
             ));
         }

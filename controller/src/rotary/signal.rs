@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use compensator::rotary::{
-    LineShape, SAMPLES_MIN, SignalSample, WIDTHS_APART, lines_in, width_seen,
+    LineShape, LinesSeen, SAMPLES_MIN, SignalSample, WIDTHS_APART, lines_in, width_seen,
 };
 use units::{Radians, RadiansPerSecond, Volts};
 
@@ -11,7 +11,7 @@ use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::pairing::Pairing;
 use crate::rotary::failure::RotaryFailure;
-use crate::rotary::sweep::{LineEdge, Turn};
+use crate::rotary::sweep::Turn;
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{LineSideName, LineSignalConfig, RotaryConfig};
 use crate::run::missing;
@@ -75,19 +75,15 @@ impl RotaryTable<'_> {
         signal: &LineSignalConfig,
         turn: &Turn,
         lines: u32,
-    ) -> Result<Vec<LineEdge>, Failure> {
+    ) -> Result<LinesSeen, Failure> {
         let sampling = signal.sampling(self.core.config, self.config);
         let shape = signal.shape(sampling.unwrap_or_default());
         let samples = self.sample_turn(signal, turn)?;
-        let found = lines_in(&samples, &shape);
-        if found.is_empty() {
+        let seen = lines_in(&samples, &shape);
+        if seen.lines.is_empty() && !seen.has_gaps() {
             return Err(self.nothing_seen(signal, &samples, lines, &shape));
         }
-        let edges = found.iter().map(|it| LineEdge {
-            position: it.position,
-            missed: u32::from(!it.is_whole),
-        });
-        Ok(edges.collect())
+        Ok(seen)
     }
 
     fn sample_turn(

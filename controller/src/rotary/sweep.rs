@@ -9,6 +9,7 @@ use core::f64::consts::TAU;
 use core::time::Duration;
 use std::collections::BTreeSet;
 
+use compensator::rotary::LinesSeen;
 use drivers::device::{LatchCommand, Latched, Repeat};
 use units::portable::{atan2, cos, sin};
 use units::{Approach, Radians, RadiansPerSecond};
@@ -20,6 +21,8 @@ use crate::rotary::line_speed::SPACING_SHARE;
 use crate::rotary::table::RotaryTable;
 use crate::rotary::turn::Way;
 
+/// So much of the spacing beside its place a line may be.
+const LINE_SHARE: f64 = 0.25;
 /// How long the axis runs at its speed before the first line counts, and after the last.
 const STEADY: Duration = Duration::from_millis(300);
 /// How long the axis stands before the probe is armed.
@@ -53,9 +56,10 @@ pub struct Sweep {
     pub phase: Radians,
     /// Positions at which no line was seen: smudged?
     pub missing: Vec<u32>,
-    /// Positions at which more than one edge came: scratched?
+    /// Positions at which more than one edge came, or a pulse that is too wide for one line: scratched?
     pub doubled: Vec<u32>,
-    /// Positions at which an edge was, or may have been, overwritten before it was read.
+    /// Positions at which an edge was, or may have been, overwritten before it was read, or samples of a voltage were
+    /// lost.
     pub overwritten: Vec<u32>,
     /// Readings that are near no line.
     pub strays: Vec<Radians>,
@@ -79,10 +83,10 @@ pub(super) struct Turn {
 
 /// Where a detector saw something.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LineEdge {
-    pub(super) position: Radians,
+struct LineEdge {
+    position: Radians,
     /// So many before it were, or may have been, lost; it may be one of a scratch then.
-    pub(super) missed: u32,
+    missed: u32,
 }
 
 impl From<&Latched<Radians>> for LineEdge {
@@ -90,6 +94,28 @@ impl From<&Latched<Radians>> for LineEdge {
         Self {
             position: latched.position,
             missed: latched.missed,
+        }
+    }
+}
+
+/// What a detector saw in a turn.
+#[derive(Clone, Debug, Default)]
+struct Passed {
+    edges: Vec<LineEdge>,
+    /// Of one whose voltage was sampled, besides the lines.
+    signal: Option<LinesSeen>,
+}
+
+impl From<LinesSeen> for Passed {
+    fn from(mut seen: LinesSeen) -> Self {
+        let lines = core::mem::take(&mut seen.lines).into_iter();
+        let edges = lines.map(|position| LineEdge {
+            position,
+            missed: 0,
+        });
+        Self {
+            edges: edges.collect(),
+            signal: Some(seen),
         }
     }
 }
@@ -131,11 +157,14 @@ impl RotaryTable<'_> {
             speed,
             limit: SWEEP_LIMIT + Duration::from_secs_f64(2.0 * way / speed.value()),
         };
-        let edges = match signal {
-            Some(signal) => self.scan(signal, &turn, options.lines)?,
-            None => self.latch_lines(&turn, options.lines)?,
+        let passed = match signal {
+            Some(signal) => self.scan(signal, &turn, options.lines)?.into(),
+            None => Passed {
+                edges: self.latch_lines(&turn, options.lines)?,
+                signal: None,
+            },
         };
-        Ok(assign(&edges, first, options))
+        Ok(assign(&passed, first, options))
     }
 
     fn check_sampling(
@@ -204,7 +233,8 @@ impl RotaryTable<'_> {
 }
 
 /// Gives each position of one turn, which begins at `first`, to its line.
-fn assign(edges: &[LineEdge], first: Radians, options: &SweepOptions) -> Sweep {
+fn assign(passed: &Passed, first: Radians, options: &SweepOptions) -> Sweep {
+    let edges = &passed.edges;
     let lines = i64::from(options.lines);
     let spacing = TAU / f64::from(options.lines);
     let phase = phase_of(edges, spacing, options.phase);
@@ -220,13 +250,23 @@ fn assign(edges: &[LineEdge], first: Radians, options: &SweepOptions) -> Sweep {
     };
     let mut counts = vec![0_u32; options.lines as usize];
     let mut unread = BTreeSet::new();
+    let mut spoilt = BTreeSet::new();
+    if let Some(signal) = &passed.signal {
+        let at = |number: i64| number.rem_euclid(lines) as u32;
+        let place = |number: i64| Radians(phase + number as f64 * spacing);
+        let lacking = window.clone().filter(|it| signal.lacks(place(*it)));
+        unread.extend(lacking.map(at));
+        let numbers = signal.wide.iter().map(|it| (it.value() - phase) / spacing);
+        let near = numbers.filter(|it| (it - it.round()).abs() <= LINE_SHARE);
+        spoilt.extend(near.map(|it| at(it.round() as i64)));
+    }
     for edge in edges {
         let number = ((edge.position.value() - phase) / spacing).round();
         let off = edge.position.value() - phase - number * spacing;
         if !window.contains(&(number as i64)) {
             continue;
         }
-        if off.abs() > spacing / 4.0 {
+        if off.abs() > spacing * LINE_SHARE {
             sweep.strays.push(edge.position);
             continue;
         }
@@ -245,6 +285,7 @@ fn assign(edges: &[LineEdge], first: Radians, options: &SweepOptions) -> Sweep {
     for (at, count) in (0_u32..).zip(&counts) {
         match count {
             0 if unread.contains(&at) => sweep.overwritten.push(at),
+            0 if spoilt.contains(&at) => sweep.doubled.push(at),
             0 => sweep.missing.push(at),
             1 => {}
             _ => sweep.doubled.push(at),
@@ -290,6 +331,14 @@ mod tests {
         }
     }
 
+    fn assigned(latched: &[LineEdge], first: Radians, options: &SweepOptions) -> Sweep {
+        let passed = Passed {
+            edges: latched.to_vec(),
+            signal: None,
+        };
+        assign(&passed, first, options)
+    }
+
     /// Lines from -2 to 362 degrees with an error of some arc-seconds each.
     fn plate(phase_deg: f64) -> Vec<LineEdge> {
         let error = |line: i32| 0.008 * f64::from(line).to_radians().sin();
@@ -300,7 +349,7 @@ mod tests {
     #[test]
     fn each_line_of_a_turn_is_read_once_whatever_the_run_up_saw() {
         let latched = plate(0.2);
-        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        let sweep = assigned(&latched, Radians::ZERO, &options(Approach::Forward, None));
         assert_eq!(sweep.read(), 360);
         assert!((sweep.phase.degrees() - 0.2).abs() < 1e-4);
         let at_90 = sweep.deviations[90].unwrap().degrees();
@@ -313,7 +362,7 @@ mod tests {
         let mut latched = plate(0.2);
         latched.reverse();
         let turn = Radians::TURN;
-        let sweep = assign(&latched, turn, &options(Approach::Reverse, None));
+        let sweep = assigned(&latched, turn, &options(Approach::Reverse, None));
         assert_eq!(sweep.read(), 360);
         let at_90 = sweep.deviations[90].unwrap().degrees();
         assert!((at_90 - 0.208).abs() < 1e-9, "{at_90}");
@@ -323,7 +372,7 @@ mod tests {
     fn smudged_lines_are_named() {
         let mut latched = plate(-0.3);
         latched.retain(|edge| !(99.0..101.0).contains(&edge.position.degrees()));
-        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        let sweep = assigned(&latched, Radians::ZERO, &options(Approach::Forward, None));
         assert_eq!(sweep.missing, [100, 101]);
         assert_eq!(sweep.read(), 358);
     }
@@ -333,7 +382,7 @@ mod tests {
         let mut latched = plate(0.0);
         latched.insert(103, edge(100.01));
         latched.insert(204, edge(200.5));
-        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        let sweep = assigned(&latched, Radians::ZERO, &options(Approach::Forward, None));
         assert_eq!(sweep.doubled, [100]);
         assert_eq!(sweep.deviations[100], None);
         assert_eq!(sweep.strays.len(), 1);
@@ -356,14 +405,14 @@ mod tests {
             latched[at.unwrap()].missed = 2;
         };
         mark(&mut latched, 53.0);
-        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        let sweep = assigned(&latched, Radians::ZERO, &options(Approach::Forward, None));
         assert_eq!(sweep.overwritten, [53, 51, 52]);
         assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
         let mut latched = plate(0.0);
         overwrite(&mut latched);
         latched.reverse();
         mark(&mut latched, 50.0);
-        let sweep = assign(&latched, Radians::TURN, &options(Approach::Reverse, None));
+        let sweep = assigned(&latched, Radians::TURN, &options(Approach::Reverse, None));
         assert_eq!(sweep.overwritten, [50, 51, 52]);
         assert_eq!((sweep.missing.as_slice(), sweep.read()), (&[200][..], 356));
     }
@@ -375,7 +424,7 @@ mod tests {
             .iter()
             .position(|edge| edge.position.degrees() > 49.5);
         latched[at.unwrap()].missed = 1;
-        let sweep = assign(&latched, Radians::ZERO, &options(Approach::Forward, None));
+        let sweep = assigned(&latched, Radians::ZERO, &options(Approach::Forward, None));
         assert_eq!(sweep.overwritten, [50]);
         assert_eq!(sweep.deviations[50], None);
         assert!(sweep.missing.is_empty());
@@ -384,14 +433,14 @@ mod tests {
     #[test]
     fn a_phase_near_half_a_spacing_is_kept_on_the_side_of_the_sweep_before() {
         let latched = plate(0.49);
-        let sweep = assign(
+        let sweep = assigned(
             &latched,
             Radians::ZERO,
             &options(Approach::Forward, Some(0.52)),
         );
         assert!((sweep.phase.degrees() - 0.49).abs() < 1e-3);
         let latched = plate(-0.49);
-        let sweep = assign(
+        let sweep = assigned(
             &latched,
             Radians::ZERO,
             &options(Approach::Forward, Some(0.49)),

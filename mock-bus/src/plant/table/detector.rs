@@ -55,7 +55,7 @@ impl Detector {
         }
     }
 
-    /// A scratch beside a line gives an edge of its own.
+    /// A scratch beside a line gives an edge of its own, and adds to the light.
     pub(super) fn scratch(&mut self, line: u32, scratched: bool) {
         if scratched {
             self.scratched.insert(line);
@@ -72,6 +72,11 @@ impl Detector {
     /// By how much a line is seen beside its place.
     pub(super) fn shift_of(&self, line: u32) -> f64 {
         self.shifted.get(&line).copied().unwrap_or(0.0)
+    }
+
+    /// Whether there is a scratch beside a line.
+    pub(super) fn is_scratched(&self, line: u32) -> bool {
+        self.scratched.contains(&line)
     }
 
     pub(super) const fn is_dead(&self) -> bool {
@@ -95,7 +100,7 @@ impl Detector {
         self.passages += 1;
         let noise = self.noise * self.stream.gaussian() + self.shift_of(passage.line);
         self.pulse(passage, noise, &counts);
-        if self.scratched.contains(&passage.line) {
+        if self.is_scratched(passage.line) {
             let behind = Radians::from_arcsec(SCRATCH_ARCSEC).value();
             let later = Passage {
                 at: passage.at + span(behind / passage.speed.abs()),

@@ -10,6 +10,8 @@ use super::config::SignalConfig;
 const WIDTHS_PER_SIGMA: f64 = 2.354_820_045_030_949_4;
 /// Beyond so many standard deviations nothing is left of a line.
 const REACH: f64 = 8.0;
+/// A scratch lies so many widths behind its line: for a wide slit both are one pulse.
+const SCRATCH_WIDTHS: f64 = 1.0;
 
 #[derive(Clone, Debug)]
 pub(super) struct Photodiode {
@@ -37,13 +39,23 @@ impl Table {
         let mass = &self.train.mass;
         let reading = mass.position_at(now) - mass.speed_at(now) * diode.latency_s;
         let angle = self.true_angle(reading);
+        let behind = SCRATCH_WIDTHS * WIDTHS_PER_SIGMA * diode.sigma;
         let reach = REACH * diode.sigma;
-        let lines = self.plate.candidates(angle - reach, angle + reach);
+        let lines = self.plate.candidates(angle - reach - behind, angle + reach);
+        let pulse = |place: f64| {
+            let z = (angle - place) / diode.sigma;
+            exp(-z * z / 2.0)
+        };
         let seen = lines.filter_map(|number| {
             let line = self.plate.visible(number)?;
             let place = self.plate.angle(number) + self.detector.shift_of(line);
-            let z = (angle - place) / diode.sigma;
-            Some(exp(-z * z / 2.0))
+            let scratched = self.detector.is_scratched(line);
+            let scratch = if scratched {
+                pulse(place + behind)
+            } else {
+                0.0
+            };
+            Some(pulse(place) + scratch)
         });
         let light: f64 = seen.sum();
         if self.detector.is_dead() {
