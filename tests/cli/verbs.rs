@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::programs::{Bench, live_rigs};
+use crate::programs::{Bench, check_error, live_rigs, truestage};
 use tests::Edit;
 
 fn number(value: &Value) -> f64 {
@@ -55,6 +55,7 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         let verified = bench.run(&["verify"]).with_code(0);
         let accuracy = number(&verified["as_left"]["accuracy"]["bidirectional"]);
         assert!((0.0..=2.0).contains(&accuracy), "A = {accuracy} µm");
+        evaluated_again(&bench, &calibrated, &verified);
 
         let report = bench.run(&[
             "report",
@@ -81,6 +82,31 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         out_of_tolerance(&bench);
         assert_eq!(bench.stop(), Some(0));
     }
+}
+
+/// The journals of runs, by the verbs for data measured elsewhere.
+fn evaluated_again(bench: &Bench, calibrated: &Value, verified: &Value) {
+    let words = ["iso230", text(&verified["journal"])];
+    let again = truestage(bench.folder(), &words).with_code(0);
+    assert_eq!(again["accuracy"], verified["as_left"]["accuracy"]);
+    let journal = text(&calibrated["journal"]);
+    let fitted = truestage(bench.folder(), &["fit", "linear", journal]).with_code(0);
+    // The table without what the budget adds to its uncertainties.
+    let deviations = |of: &Value| -> Vec<Value> {
+        let nodes = of["nodes"].as_array().expect("a table has nodes");
+        nodes.iter().map(|it| it["deviation_um"].clone()).collect()
+    };
+    assert_eq!(deviations(&fitted), deviations(&calibrated["fit"]));
+    let words = [
+        "iso230",
+        journal,
+        "--instrument",
+        "laser",
+        "--config",
+        "machine.toml",
+    ];
+    let refused = truestage(bench.folder(), &words).with_code(2);
+    check_error(&refused, &["is a journal", "leave it out"]);
 }
 
 #[test]

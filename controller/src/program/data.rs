@@ -8,14 +8,15 @@ use compensator::error_table::{self, FitOptions, Fitted};
 use compensator::hall_zero::HallSeries;
 use compensator::hall_zero::fit_hall;
 use compensator::iso230;
-use machine::records::{CalibrationRecord, short};
+use machine::records::{CalibrationRecord, read_journal, short};
 use serde_json::json;
 use units::{Approach, Metres};
 
 use crate::config::MachineConfig;
-use crate::linear::LinearContent;
+use crate::linear::measure::series_of as measured_series;
+use crate::linear::{LinearContent, LinearLog};
 use crate::program::data_file::head_of;
-use crate::program::data_text::{name_of, read};
+use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::linear::elsewhere::Elsewhere;
 use crate::program::linear::uncertainty;
 use crate::program::output::{Ended, Output};
@@ -24,9 +25,9 @@ use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum FitCommand {
-    /// An error table from columns run,approach,target_mm,measured_mm.
+    /// An error table from columns run,approach,target_mm,measured_mm, or from the journal of a run.
     Linear {
-        /// The data file.
+        /// The data file, or a journal (*.jsonl).
         data: PathBuf,
         /// Store it as a calibration of this machine (activate it with `cal activate`).
         #[arg(long, value_name = "CONFIG")]
@@ -93,9 +94,27 @@ impl MeasuredBy {
     }
 }
 
+/// The points of a journal, which were corrected when they were read.
+fn series_of_journal(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSeries, Failure> {
+    if by.is_some() {
+        return Err(Failure::Usage {
+            what: format!(
+                "--instrument is for data files, and {} is a journal",
+                name_of(path)
+            ),
+            help: "leave it out: what a journal has was corrected when it was measured".into(),
+        });
+    }
+    let journal = read_journal::<LinearLog>(path)?;
+    measured_series(&journal.log.points)
+}
+
 /// Reads a series; columns of the environment that nothing would use are refused, as nobody could tell whether the
 /// readings are corrected by them.
 fn series_of(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSeries, Failure> {
+    if is_journal(path) {
+        return series_of_journal(path, by);
+    }
     let series = LinearSeries::from_csv(&read(path)?, &name_of(path))?;
     match by {
         Some(by) => by.corrected(&series),

@@ -38,6 +38,11 @@ pub(crate) fn name_of(path: &Path) -> String {
     }
 }
 
+/// Whether it is the journal of a run, by its name.
+pub(crate) fn is_journal(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "jsonl")
+}
+
 fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
 }

@@ -14,7 +14,7 @@ use crate::Failure;
 use crate::config;
 use crate::config::Loaded;
 use crate::program::data_file::volume_head_of;
-use crate::program::data_text::{name_of, read};
+use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::shown;
 use crate::program::volumetric::verbs::{add_unknown, found_value, unknown_text, warmth_text};
@@ -65,9 +65,9 @@ pub(crate) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
     let loaded = config::load(&args.config)?;
     let own = loaded.config.volumetric.as_ref();
     let own = own.ok_or(VolumetricFailure::None)?;
-    let mut given = match args.data.extension() {
-        Some(end) if end == "jsonl" => of_journal(args)?,
-        _ => of_series(args, own)?,
+    let mut given = match is_journal(&args.data) {
+        true => of_journal(args)?,
+        false => of_series(args, own)?,
     };
     leave_out(&mut given.read, &args.without)?;
     let shape = function_shape(own.compensation.interpolation);
