@@ -307,8 +307,7 @@ pub trait DisplacementInstrument: Device {
     /// What the instrument's own sensors say about its environment.
     fn environment(&self) -> Environment;
 
-    /// How strong its signal is, by what it sent last, also while it is not started; `None` for one that does
-    /// not say so.
+    /// How its signal is, by what it sent last, also while it is not started; `None` for one that has said nothing of it.
     fn signal(&self) -> Option<Signal> {
         None
     }
@@ -320,15 +319,32 @@ pub trait DisplacementInstrument: Device {
     }
 }
 
-/// How strong the signal of an instrument is, in a unit of its own: more is better.
+/// How the signal of an instrument is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signal {
-    /// When it was said.
+    /// When something was said of it last.
     pub at: Time,
-    /// How strong.
-    pub strength: i32,
+    /// How strong, in a unit of its own: more is better. `None` before it was said.
+    pub strength: Option<i32>,
     /// Below this it counts as lost, where that is set.
     pub least: Option<i32>,
+    /// Why nothing can be counted by it.
+    pub trouble: Option<SignalTrouble>,
+}
+
+/// Why an instrument cannot count by its signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SignalTrouble {
+    /// The source gives no reference.
+    NoReference,
+    /// Nothing of the measurement beam comes back.
+    NoBeam,
+    /// It comes back with a beat that no motion within what the instrument can follow explains.
+    Beat,
+    /// There is light, but too little of it for a phase.
+    NoPhase,
+    /// It is weaker than what is set as the least.
+    Weak,
 }
 
 /// A displacement, not yet corrected for the medium or for temperature.

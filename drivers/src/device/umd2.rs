@@ -23,7 +23,7 @@ use wire::Payload;
 use wire::umd2::{Line, LowSpeed, Sample};
 use wire::{Input, LinkState};
 
-use self::health::fault_of;
+use self::health::{fault_of, trouble_of};
 use self::sequence::{Continuity, Sequence};
 pub use self::settings::Umd2Settings;
 use self::weather::Weather;
@@ -177,6 +177,7 @@ impl Umd2 {
     fn sample(&mut self, now: Time, sample: Sample) {
         let garbage = core::mem::take(&mut self.garbage_in_a_row);
         self.heard = now;
+        self.weather.see(now, trouble_of(&sample));
         self.is_silent = false;
         self.counts.samples += 1;
         self.low_speed(now, sample.low_speed);

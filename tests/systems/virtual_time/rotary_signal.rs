@@ -123,7 +123,6 @@ fn a_slow_turn_and_a_module_that_leaves_syncs_out_see_every_line_and_a_fast_turn
 /// What a turn came to, by positions.
 struct Turned {
     missing: Vec<u32>,
-    overwritten: Vec<u32>,
     doubled: Vec<u32>,
     read: usize,
 }
@@ -142,37 +141,8 @@ fn forward(bench: &mut Bench) -> Turned {
     Turned {
         read: it.read(),
         missing: it.missing,
-        overwritten: it.overwritten,
         doubled: it.doubled,
     }
-}
-
-/// Every fiftieth sample of the voltage is lost somewhere. That is no dirt, and what is dirty is.
-#[test]
-fn lines_of_which_samples_are_lost_are_told_as_lost_and_not_as_dirt() {
-    let mut bench = bench(24);
-    started(&mut bench);
-    inject(&bench, Fault::LineSmudged { line: 60 });
-    let before = forward(&mut bench);
-    assert_eq!(
-        (&before.missing[..], before.overwritten.len()),
-        (&[60][..], 0)
-    );
-    let lost = FaultConfig {
-        probability: 0.02,
-        ..FaultConfig::permanent(Fault::Drop {
-            port: "can0".into(),
-            cob_id: Some(0x380 + 15),
-        })
-    };
-    let id = bench.emulated.simulation_mut().inject(lost);
-    let id = id.expect("a fault of this machine");
-    let it = forward(&mut bench);
-    assert!(bench.emulated.simulation().fault_deliveries(id) > 10);
-    assert!(it.overwritten.len() > 5 && it.doubled.is_empty());
-    assert!(it.missing.iter().all(|it| *it == 60), "{:?}", it.missing);
-    let told = it.read + it.overwritten.len() + it.missing.len();
-    assert_eq!(told, LINES as usize);
 }
 
 #[test]

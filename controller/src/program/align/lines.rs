@@ -1,6 +1,7 @@
 //! What detectors see, as a line for people or an object for programs.
 
 use compensator::volumetric::online::Trouble;
+use drivers::device::{Signal, SignalTrouble};
 use serde_json::{Value, json};
 use units::{Metres, Radians, Volts};
 
@@ -21,6 +22,23 @@ pub(super) const fn words(trouble: &Trouble) -> (&'static str, &'static str) {
         Trouble::Jumped { .. } => ("JUMPED", "jumped"),
         Trouble::Implausible { .. } => ("NO NUMBER", "implausible"),
     }
+}
+
+/// How an instrument's signal is, in two words and in one for programs.
+pub(super) const fn signal_words(signal: &Signal) -> (&'static str, &'static str) {
+    match signal.trouble {
+        None => ("good", "good"),
+        Some(SignalTrouble::NoReference) => ("NO LASER", "no_reference"),
+        Some(SignalTrouble::NoBeam) => ("NO BEAM", "no_beam"),
+        Some(SignalTrouble::Beat) => ("TOO FAST", "beat"),
+        Some(SignalTrouble::NoPhase) => ("TOO DIM", "no_phase"),
+        Some(SignalTrouble::Weak) => ("WEAK", "weak"),
+    }
+}
+
+fn signal_line(name: &str, signal: &Signal) -> String {
+    let strength = signal.strength.map_or("-".to_owned(), |it| it.to_string());
+    format!("{name} signal {strength}, {}", signal_words(signal).0)
 }
 
 /// A value of a reading in micrometres, of a roll in arcseconds.
@@ -58,7 +76,7 @@ fn sight_line(it: &Sight) -> String {
 pub(super) fn line(view: &View) -> String {
     let sights = view.sights.iter().map(sight_line);
     let signals = view.signals.iter().map(|(name, signal)| match signal {
-        Some(signal) => format!("{name} signal {}", signal.strength),
+        Some(signal) => signal_line(name, signal),
         None => format!("{name} says nothing of its signal"),
     });
     let all: Vec<String> = sights.chain(signals).collect();
@@ -95,7 +113,8 @@ pub(super) fn value(view: &View) -> Value {
         let age = signal.map(|it| view.now.since(it.at).as_secs_f64());
         json!({
             "instrument": name,
-            "strength": signal.map(|it| it.strength),
+            "state": signal.as_ref().map(|it| signal_words(it).1),
+            "strength": signal.and_then(|it| it.strength),
             "least": signal.and_then(|it| it.least),
             "age_s": age,
         })

@@ -38,8 +38,8 @@ pub(crate) struct AlignArgs {
     /// Look once, and end.
     #[arg(long, conflicts_with = "span")]
     once: bool,
-    /// Also show how strong the signal of each `[instrument.NAME]` is that says so; its line is opened, so it must
-    /// be there. A machine without beams shows that alone.
+    /// Also show the signal of each `[instrument.NAME]` that tells of it: how strong it is, and why it cannot be counted
+    /// by; its line is opened, so it must be there. A machine without beams shows that alone.
     #[arg(long)]
     instruments: bool,
 }
@@ -49,7 +49,7 @@ struct View {
     /// Since the first look.
     seconds: f64,
     sights: Vec<Sight>,
-    /// By name; `None` before an instrument has said how strong its signal is.
+    /// By name; `None` before an instrument has said anything of its signal.
     signals: Vec<(String, Option<Signal>)>,
     now: Time,
 }

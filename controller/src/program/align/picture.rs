@@ -10,7 +10,7 @@ use drivers::device::Signal;
 use units::Time;
 
 use super::View;
-use super::lines::{in_unit, words};
+use super::lines::{in_unit, signal_words, words};
 use crate::volumetric::sight::{Sight, SightReading};
 
 /// Inside the brackets of a bar.
@@ -80,18 +80,22 @@ impl Screen {
         let Some(signal) = signal else {
             return format!("{name:<10} says nothing of its signal");
         };
-        let strongest = self.strongest.entry(name.clone()).or_default();
-        *strongest = (*strongest).max(signal.strength);
-        let share = f64::from(signal.strength.max(0)) / f64::from((*strongest).max(1));
-        let filled = (share * CELLS as f64).round() as usize;
-        let least = signal.least.map(|it| format!(", at least {it}"));
         let age_s = now.since(signal.at).as_secs_f64();
         let state = match age_s > SIGNAL_AGE_MAX_S {
             true => format!("{age_s:.0} s old"),
-            false => format!("best {strongest}{}", least.unwrap_or_default()),
+            false => signal_words(signal).0.to_owned(),
         };
+        let Some(strength) = signal.strength else {
+            return format!("{name:<10} {:>9} [{:CELLS$}] {state}", "-", "");
+        };
+        let strongest = self.strongest.entry(name.clone()).or_default();
+        *strongest = (*strongest).max(strength);
+        let share = f64::from(strength.max(0)) / f64::from((*strongest).max(1));
+        let filled = (share * CELLS as f64).round() as usize;
         let bar = "#".repeat(filled.min(CELLS));
-        format!("{name:<10} {:>9} [{bar:<CELLS$}] {state}", signal.strength)
+        let least = signal.least.map(|it| format!(", at least {it}"));
+        let best = format!("best {strongest}{}", least.unwrap_or_default());
+        format!("{name:<10} {strength:>9} [{bar:<CELLS$}] {state}, {best}")
     }
 }
 
@@ -163,6 +167,7 @@ fn bar(reading: &SightReading) -> String {
 mod tests {
     use compensator::volumetric::Axis;
     use compensator::volumetric::online::Trouble;
+    use drivers::device::SignalTrouble;
     use units::{Metres, Radians, Volts};
 
     use super::*;
@@ -201,8 +206,9 @@ mod tests {
                 "laser".into(),
                 Some(Signal {
                     at: Time::from_seconds(3.0),
-                    strength: 45,
+                    strength: Some(45),
                     least: Some(20),
+                    trouble: None,
                 }),
             )],
             now: Time::from_seconds(3.2),
@@ -235,7 +241,7 @@ mod tests {
             "x end   y     (+188) [            :|:::         >]           8.02 V BESIDE",
             "        z      (+94) [            :|:::   ?      ]",
             "",
-            "laser             45 [###########################] best 45, at least 20",
+            "laser             45 [###########################] good, best 45, at least 20",
         ];
         assert_eq!(seen.len(), expected.len());
         for (seen, expected) in seen.iter().zip(expected) {
@@ -289,16 +295,17 @@ mod tests {
         let mut view = view(Vec::new());
         screen.lines(&view);
         if let Some((_, Some(signal))) = view.signals.first_mut() {
-            signal.strength = 15;
+            signal.strength = Some(15);
+            signal.trouble = Some(SignalTrouble::Weak);
         }
         let seen = screen.lines(&view).pop().unwrap();
         assert!(
-            seen.contains("[#########   ") && seen.contains("best 45"),
+            seen.contains("[#########   ") && seen.contains("WEAK, best 45"),
             "{seen}"
         );
         view.now = Time::from_seconds(9.0);
         let seen = screen.lines(&view).pop().unwrap();
-        assert!(seen.ends_with("6 s old"), "{seen}");
+        assert!(seen.contains("6 s old"), "{seen}");
         view.signals[0].1 = None;
         let seen = screen.lines(&view).pop().unwrap();
         assert!(seen.contains("says nothing of its signal"), "{seen}");

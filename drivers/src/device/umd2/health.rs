@@ -1,6 +1,6 @@
 //! Whether a sample's count means anything.
 
-use crate::device::Alarm;
+use crate::device::{Alarm, SignalTrouble};
 use wire::umd2::Sample;
 
 /// The measurement frequency is next to nothing below this part of the reference.
@@ -21,4 +21,15 @@ pub(super) const fn fault_of(sample: &Sample) -> Option<Alarm> {
         return Some(Alarm::SlewError);
     }
     None
+}
+
+/// What is wrong with the signal by one sample, for whoever aligns the optics.
+pub(super) const fn trouble_of(sample: &Sample) -> Option<SignalTrouble> {
+    match fault_of(sample) {
+        Some(Alarm::LaserLost) => Some(SignalTrouble::NoReference),
+        Some(Alarm::BeamLost) => Some(SignalTrouble::NoBeam),
+        Some(_) => Some(SignalTrouble::Beat),
+        None if !sample.phase_is_valid() => Some(SignalTrouble::NoPhase),
+        None => None,
+    }
 }

@@ -1,7 +1,7 @@
 //! What the interferometer must and must not make of its stream.
 
 use super::*;
-use crate::device::Direction;
+use crate::device::{Direction, SignalTrouble};
 use proptest::prelude::*;
 
 const REFERENCE: u32 = 2_458;
@@ -207,9 +207,39 @@ fn the_strength_of_the_signal_is_told_before_the_start_and_while_the_beam_is_los
         bench.sample.low_speed = LowSpeed::SignalStrength(strength);
         bench.next();
         let signal = bench.device.signal().unwrap();
-        assert_eq!((signal.strength, signal.least), (strength, Some(200)));
+        assert_eq!((signal.strength, signal.least), (Some(strength), Some(200)));
+        let trouble = (strength < 200).then_some(SignalTrouble::Weak);
+        assert_eq!(signal.trouble, trouble);
     }
     assert_eq!(bench.alarms(), []);
+}
+
+#[test]
+fn what_is_wrong_with_the_signal_is_told_by_the_newest_sample() {
+    type Spoil = fn(&mut Sample);
+    let mut bench = Bench::new(Umd2Settings::default());
+    let cases: [(Spoil, Option<SignalTrouble>); 5] = [
+        (|_| {}, None),
+        (
+            |it| it.reference_count = 0,
+            Some(SignalTrouble::NoReference),
+        ),
+        (|it| it.measurement_count = 0, Some(SignalTrouble::NoBeam)),
+        (|it| it.measurement_count *= 3, Some(SignalTrouble::Beat)),
+        (|it| it.phase |= 0x0200, Some(SignalTrouble::NoPhase)),
+    ];
+    for (spoil, trouble) in cases {
+        let good = bench.sample;
+        spoil(&mut bench.sample);
+        bench.next();
+        bench.sample = Sample {
+            sequence: bench.sample.sequence,
+            ..good
+        };
+        let signal = bench.device.signal().expect("it has spoken");
+        assert_eq!((signal.trouble, signal.strength), (trouble, None));
+        assert_eq!(signal.at, bench.now);
+    }
 }
 
 #[test]

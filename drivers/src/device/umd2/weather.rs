@@ -4,7 +4,7 @@ use core::time::Duration;
 use units::{Celsius, Pascals, RelativeHumidity, Time};
 use wire::umd2::LowSpeed;
 
-use super::super::{Environment, Signal};
+use super::super::{Environment, Signal, SignalTrouble};
 
 /// The newest values and when they came. Temperature 1 is the air's, 2 the material's.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +14,9 @@ pub(super) struct Weather {
     material: Option<(Celsius, Time)>,
     pressure: Option<(Pascals, Time)>,
     humidity: Option<(RelativeHumidity, Time)>,
-    signal: Option<(i32, Time)>,
+    strength: Option<i32>,
+    /// When the newest sample came, and what is wrong with the signal by it.
+    seen: Option<(Time, Option<SignalTrouble>)>,
 }
 
 impl Weather {
@@ -25,17 +27,26 @@ impl Weather {
             material: None,
             pressure: None,
             humidity: None,
-            signal: None,
+            strength: None,
+            seen: None,
         }
     }
 
-    /// How strong the signal was said to be last; below `least` it counts as lost.
+    /// A sample came, with this wrong with its signal.
+    pub(super) const fn see(&mut self, now: Time, trouble: Option<SignalTrouble>) {
+        self.seen = Some((now, trouble));
+    }
+
+    /// How the signal is; one that is not as strong as `least` counts as lost.
     pub(super) fn signal(&self, least: Option<i32>) -> Option<Signal> {
-        let (strength, at) = self.signal?;
+        let (at, trouble) = self.seen?;
+        let is_weak = |strength: i32| least.is_some_and(|least| strength < least);
+        let weak = self.strength.filter(|it| is_weak(*it));
         Some(Signal {
             at,
-            strength,
+            strength: self.strength,
             least,
+            trouble: trouble.or(weak.map(|_| SignalTrouble::Weak)),
         })
     }
 
@@ -46,7 +57,7 @@ impl Weather {
             LowSpeed::Temperature1(raw) => self.air = celsius(raw).map(|value| (value, now)),
             LowSpeed::Temperature2(raw) => self.material = celsius(raw).map(|value| (value, now)),
             LowSpeed::Pressure(raw) => self.pressure = pascals(raw).map(|value| (value, now)),
-            LowSpeed::SignalStrength(raw) => self.signal = Some((raw, now)),
+            LowSpeed::SignalStrength(raw) => self.strength = Some(raw),
             LowSpeed::Humidity(raw) => self.humidity = humidity(raw).map(|value| (value, now)),
             _ => {}
         }
