@@ -18,6 +18,9 @@ const COMPONENTS: usize = 6;
 /// The upper triangle, row by row.
 pub const ENTRIES: usize = COMPONENTS * (COMPONENTS + 1) / 2;
 
+/// What rounding makes of two errors that are one and the same.
+const ROUNDING: f64 = 1e-6;
+
 /// Why numbers are no covariance.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CovarianceError {
@@ -35,8 +38,10 @@ pub enum CovarianceError {
         /// How many there should be.
         wanted: usize,
     },
-    /// A number that is none, or a variance below zero.
-    #[error("covariance: place {place} has a value that is not finite, or a variance below zero")]
+    /// A number that is none, a variance below zero, or more in common than there is.
+    #[error(
+        "covariance: place {place} has a value that is not finite, a variance below zero, or a covariance beyond both variances"
+    )]
     Value {
         /// Which place, counted from 0.
         place: usize,
@@ -148,16 +153,21 @@ fn propagated(row: &[f64; COMPONENTS], covariance: &[f64; ENTRIES]) -> f64 {
     sum
 }
 
+/// Finite, no variance below zero, and no two errors that have more in common than each has.
 fn is_sound(covariance: &[f64; ENTRIES]) -> bool {
-    let is_finite = covariance.iter().all(|it| it.is_finite());
+    let mut variances = [0.0; COMPONENTS];
     // The first entry of each row of the triangle.
     let mut at = 0;
-    let variances = (0..COMPONENTS).all(|row| {
-        let variance = covariance[at];
+    for (row, variance) in variances.iter_mut().enumerate() {
+        *variance = covariance[at];
         at += COMPONENTS - row;
-        variance >= 0.0
-    });
-    is_finite && variances
+    }
+    let pairs = (0..COMPONENTS).flat_map(|i| (i..COMPONENTS).map(move |k| (i, k)));
+    let mut entries = covariance.iter().zip(pairs);
+    entries.all(|(entry, (i, k))| {
+        let most = variances[i] * variances[k] * (1.0 + ROUNDING);
+        variances[i] >= 0.0 && entry.is_finite() && entry * entry <= most
+    })
 }
 
 #[cfg(test)]
@@ -213,6 +223,9 @@ mod tests {
         let mut places = vec![opposed(); 8];
         places[3][0] = -1e-12;
         assert_eq!(grid(places), Err(CovarianceError::Value { place: 3 }));
+        let mut places = vec![opposed(); 8];
+        places[6][5] = 5e-12;
+        assert_eq!(grid(places), Err(CovarianceError::Value { place: 6 }));
         let falls = || vec![Metres(0.1), Metres(0.0)];
         let seen = ErrorCovariance::new([falls(), falls(), falls()], vec![opposed(); 8]);
         assert_eq!(seen, Err(CovarianceError::Positions { axis: Axis::X }));

@@ -113,8 +113,10 @@ impl VolumetricEvaluated {
     fn covariance(&self, config: &VolumetricConfig) -> Option<ErrorCovariance> {
         let even = |k: usize| {
             let (low, high) = (config.low_mm[k], config.high_mm[k]);
-            let at = |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
-            (0..=PLACES).map(|n| Metres::from_mm(at(n))).collect()
+            let inner = |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
+            // Rounding must not put the last place outside the nodes.
+            let all = (0..PLACES).map(inner).chain([high]);
+            all.map(Metres::from_mm).collect()
         };
         self.found.covariance([even(0), even(1), even(2)])
     }
