@@ -11,6 +11,7 @@ use machine::engine::Live;
 use machine::engine::Observed;
 use machine::records::{CalibrationRecord, RecordHead};
 use mock_bus::plant::VolumetricTruth;
+use truestage::Failure;
 use truestage::for_tests::VolumetricCalibrated;
 use truestage::volumetric::{GeometryContent, WarmUp, WorkVolume};
 use truestage::volumetric::{Mover, VolumetricCorrection, VolumetricState};
@@ -181,12 +182,20 @@ impl Volume {
     /// When that fails.
     pub fn calibrated(fresh: impl Fn() -> Self, warm_up: WarmUp) -> (Self, VolumetricCalibrated) {
         let mut before = fresh();
-        let store = before.bench.store.clone();
-        let mut hand = before.bench.emulated.clone();
-        let made = good(before.work().calibrate(&store, warm_up, None, &mut hand));
+        let made = good(before.calibrate(warm_up));
         let later = fresh();
         later.inherit(&before);
         (later, made)
+    }
+
+    /// Calibrates it, cold and again after `warm_up`.
+    ///
+    /// # Errors
+    /// When that fails.
+    pub fn calibrate(&mut self, warm_up: WarmUp) -> Result<VolumetricCalibrated, Failure> {
+        let store = self.bench.store.clone();
+        let mut hand = self.bench.emulated.clone();
+        self.work().calibrate(&store, warm_up, None, &mut hand)
     }
 
     /// Stores what `other` has stored: the same machine on another day.

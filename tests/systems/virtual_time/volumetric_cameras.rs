@@ -11,7 +11,8 @@ use tests::volume::{
     Frame, Off, Volume, by_short_ways, calm, good, largest, percentile_95, point_mm, quick,
     random_places, spread,
 };
-use tests::{Edit, with_emulated_spot_cameras, with_spot_cameras};
+use tests::{Edit, judged_of_each, seeds, with_emulated_spot_cameras, with_spot_cameras};
+use truestage::Failure;
 use truestage::volumetric::{Mover, VolumetricState, WarmUp};
 use units::{Metres, Time};
 
@@ -97,19 +98,21 @@ fn machines_seen_by_cameras_stay_right_while_they_warm_up_and_are_as_sure_as_the
     }
 }
 
+const TWO_HOURS: WarmUp = WarmUp::Idle(Duration::from_secs(2 * 3600));
+
+fn quickly_read(seed: u64) -> Volume {
+    Volume::zeroed(
+        seed,
+        |text| with_spot_cameras(&quick(text), &ALL),
+        |text| with_emulated_spot_cameras(&text, &ALL),
+    )
+}
+
 /// Cold and warm, with the cameras looked through at every stop; then on another day. Few readings leave more than many.
 #[test]
 fn a_machine_calibrated_through_its_cameras_is_right_another_day_and_as_sure_as_it_says() {
     let seed = 61_032;
-    let fresh = || {
-        Volume::zeroed(
-            seed,
-            |text| with_spot_cameras(&quick(text), &ALL),
-            |text| with_emulated_spot_cameras(&text, &ALL),
-        )
-    };
-    let warm_up = WarmUp::Idle(Duration::from_secs(2 * 3600));
-    let (volume, made) = Volume::calibrated(fresh, warm_up);
+    let (volume, made) = Volume::calibrated(|| quickly_read(seed), TWO_HOURS);
     let scatter = made.found.birge_ratio.expect("readings to spare");
     let it = later(volume, seed);
     let text = format!(
@@ -126,6 +129,23 @@ fn a_machine_calibrated_through_its_cameras_is_right_another_day_and_as_sure_as_
     assert!(it.tables_um > 4.0 * it.rest_um, "{text}");
     assert!(it.rest_um < 2.0, "{text}");
     assert!(it.by_stated < 1.6 && made.u_max.um() < 0.8, "{text}");
+}
+
+/// How many sound ones are refused: `SEEDS=1..40 cargo test -p tests --test systems machines_seen_by_cameras_counted --
+/// --ignored --nocapture`.
+#[test]
+#[ignore = "many machines: for whoever wants the rates, over SEEDS=FIRST..LAST"]
+fn machines_seen_by_cameras_counted_over_many() {
+    let seeds: Vec<u64> = seeds("1..40").collect();
+    let tried = seeds.len();
+    let calibrated = judged_of_each(seeds.into_iter(), &|seed| {
+        let made = quickly_read(seed).calibrate(TWO_HOURS)?;
+        Ok::<_, Failure>(made.found.birge_ratio.expect("readings to spare"))
+    });
+    let most = calibrated.iter().copied().fold(0.0, f64::max);
+    let kept = calibrated.len();
+    println!("{kept} of {tried} calibrated, readings scatter at most {most:.2} of what is stated");
+    assert_eq!(kept, tried);
 }
 
 /// By how much the tool is off at each place, after it has stood there for some pictures.
