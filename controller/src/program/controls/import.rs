@@ -48,7 +48,7 @@ pub(crate) struct ImportArgs {
     /// LinuxCNC: what stands in the INI file, 0 for positions or 1 for trims.
     #[arg(long, value_name = "TYPE", value_parser = clap::value_parser!(u8).range(0..=1))]
     comp_file_type: Option<u8>,
-    /// LinuxCNC: the unit of its numbers, [TRAJ] LINEAR_UNITS.
+    /// LinuxCNC: the unit of its numbers, `[TRAJ] LINEAR_UNITS`.
     #[arg(long, value_enum)]
     unit: Option<UnitName>,
     /// Use it from now on; without it what was used before stays in use.
