@@ -44,6 +44,8 @@ pub(crate) enum Order {
     Calibration(Choice),
     /// The lease goes back.
     Release,
+    /// Something that a person should look after is said among the events.
+    Warn { text: String },
     /// The service ends.
     End,
 }
@@ -61,7 +63,11 @@ impl Order {
     /// Whether only the holder of the lease may ask for it.
     pub(crate) const fn needs_lease(&self) -> bool {
         match self {
-            Self::Stop { .. } | Self::Lease { .. } | Self::Release | Self::End => false,
+            Self::Stop { .. }
+            | Self::Lease { .. }
+            | Self::Release
+            | Self::Warn { .. }
+            | Self::End => false,
             Self::Move { .. }
             | Self::Jog { .. }
             | Self::Renew { .. }

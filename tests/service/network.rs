@@ -7,7 +7,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use rustls::crypto::ring::default_provider;
 use rustls::pki_types::pem::PemObject;
@@ -371,4 +372,65 @@ fn what_is_missing_or_open_to_others_is_refused_before_anything_is_listened_to()
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
     }
     assert!(Access::open(files.given()).is_ok());
+}
+
+/// Asks as a viewer until the file of tokens has been read again: within a second.
+fn wait_for(net: &Net<'_>, token: &str, status: u16) {
+    let begun = Instant::now();
+    loop {
+        let answer = net.ask("GET /v1/machine", &bearer(token), &Value::Null);
+        if answer.status == status {
+            return;
+        }
+        assert!(begun.elapsed() < LATE, "{} {}", answer.status, answer.body);
+        thread::park_timeout(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn a_slip_in_the_file_of_tokens_takes_the_stop_from_nobody_and_is_told() {
+    on_a_stage(|stage, files| {
+        let net = Net::new(stage, files);
+        let path = files.path("tokens.toml");
+        let good = fs::read_to_string(&path).unwrap();
+        fs::write(&path, format!("{good}\n[[token]]\nname = \"otto\"\n")).unwrap();
+        wait_for(&net, &files.tokens[0], 507);
+        for (token, role) in files.tokens.iter().zip(ROLES) {
+            let stop = net.ask("POST /v1/stop", &bearer(token), &Value::Null);
+            assert_eq!(stop.status, 200, "{role}: {}", stop.body);
+            for line in ["GET /v1/machine", "POST /v1/reset"] {
+                let other = net.ask(line, &bearer(token), &Value::Null);
+                assert_eq!(other.status, 507, "{line} {role}: {}", other.body);
+            }
+        }
+        let stranger = net.ask("POST /v1/stop", &bearer("0a1b"), &Value::Null);
+        assert_eq!(stranger.status, 507, "{}", stranger.body);
+        let warnings = || {
+            let _passing = stage.gate.pass();
+            let events = stage.desk.events(0).into_iter();
+            let warnings = events.filter(|it| it.kind == "warning");
+            let texts = warnings.map(|it| it.data["text"].as_str().unwrap().to_owned());
+            texts
+                .filter(|it| it.contains("the file of tokens"))
+                .collect::<Vec<_>>()
+        };
+        let wait_for_warnings = |count: usize| {
+            let begun = Instant::now();
+            while warnings().len() < count {
+                assert!(begun.elapsed() < LATE, "{:?}", warnings());
+                thread::park_timeout(Duration::from_millis(20));
+            }
+        };
+        wait_for_warnings(1);
+        fs::write(&path, &good).unwrap();
+        wait_for(&net, &files.tokens[0], 200);
+        wait_for_warnings(2);
+        let told = warnings();
+        assert_eq!(told.len(), 2, "once each: {told:?}");
+        assert!(
+            told[0].contains("tokens.toml:") && told[0].contains("missing field"),
+            "{told:?}"
+        );
+        assert!(told[1].contains("can be used again"), "{told:?}");
+    });
 }

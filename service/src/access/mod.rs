@@ -118,4 +118,14 @@ impl KnownTokens {
     pub(crate) fn owner(&self, token: &str) -> Result<Option<Owner>, Arc<TokenError>> {
         Ok(self.0.newest()?.owner(token).cloned())
     }
+
+    /// Whose `token` was when the file could be used last: a slip in it takes the stop from nobody.
+    pub(crate) fn owner_before(&self, token: &str) -> Option<Owner> {
+        self.0.last_good().owner(token).cloned()
+    }
+
+    /// What is wrong with the file now.
+    pub(crate) fn trouble(&self) -> Option<Arc<TokenError>> {
+        self.0.newest().err()
+    }
 }

@@ -1,7 +1,7 @@
 //! TLS of the service: a certificate and its key from PEM files, taken anew when they have changed.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use rustls::ServerConfig;
 use rustls::crypto::ring::default_provider;
@@ -40,34 +40,17 @@ pub enum TlsError {
 }
 
 /// Who the service proves to be.
-pub(crate) struct Tls {
-    files: Watched<ServerConfig, TlsError>,
-    /// The last that could be used: a certificate and a key are not exchanged at the same moment.
-    good: Mutex<Arc<ServerConfig>>,
-}
+pub(crate) struct Tls(Watched<ServerConfig, TlsError>);
 
 impl Tls {
     pub(crate) fn open(certificate: PathBuf, key: PathBuf) -> Result<Self, TlsError> {
         let both = vec![certificate.clone(), key.clone()];
-        let files = Watched::open(both, move || config(&certificate, &key))?;
-        let good = match files.newest() {
-            Ok(config) => config,
-            // It was read a moment ago.
-            Err(_) => unreachable!("what was read is kept for a second"),
-        };
-        Ok(Self {
-            files,
-            good: Mutex::new(good),
-        })
+        Watched::open(both, move || config(&certificate, &key)).map(Self)
     }
 
-    /// For the next connection.
+    /// For the next connection. The last that could be used: a certificate and a key are not exchanged at the same moment.
     pub(crate) fn config(&self) -> Arc<ServerConfig> {
-        let mut good = self.good.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Ok(newest) = self.files.newest() {
-            *good = newest;
-        }
-        Arc::clone(&good)
+        self.0.last_good()
     }
 }
 

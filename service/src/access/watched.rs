@@ -4,7 +4,7 @@
 use core::time::Duration;
 use std::fs;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
 
 /// How often it is looked whether a file has changed.
@@ -23,7 +23,10 @@ pub(super) struct Watched<T, E> {
 struct State<T, E> {
     looked: Instant,
     look: Look,
-    said: Result<Arc<T>, Arc<E>>,
+    /// The last that could be used.
+    good: Arc<T>,
+    /// What is wrong with what they say now.
+    wrong: Option<Arc<E>>,
 }
 
 impl<T, E> Watched<T, E> {
@@ -37,7 +40,8 @@ impl<T, E> Watched<T, E> {
         let state = State {
             looked: Instant::now(),
             look,
-            said: Ok(Arc::new(read()?)),
+            good: Arc::new(read()?),
+            wrong: None,
         };
         Ok(Self {
             files,
@@ -54,18 +58,37 @@ impl<T, E> Watched<T, E> {
         self.newest_at(Instant::now())
     }
 
+    /// The last that they said and that could be used; what they say now, if that can.
+    pub(super) fn last_good(&self) -> Arc<T> {
+        Arc::clone(&self.looked_at(Instant::now()).good)
+    }
+
     fn newest_at(&self, now: Instant) -> Result<Arc<T>, Arc<E>> {
+        let state = self.looked_at(now);
+        match &state.wrong {
+            None => Ok(Arc::clone(&state.good)),
+            Some(wrong) => Err(Arc::clone(wrong)),
+        }
+    }
+
+    fn looked_at(&self, now: Instant) -> MutexGuard<'_, State<T, E>> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if now.saturating_duration_since(state.looked) >= LOOK_EVERY {
             state.looked = now;
             let look = look_at(&self.files);
             // One that could not be used is tried again: its mode may have been put right, which no time tells.
-            if look != state.look || state.said.is_err() {
+            if look != state.look || state.wrong.is_some() {
                 state.look = look;
-                state.said = (self.read)().map(Arc::new).map_err(Arc::new);
+                match (self.read)() {
+                    Ok(good) => {
+                        state.good = Arc::new(good);
+                        state.wrong = None;
+                    }
+                    Err(wrong) => state.wrong = Some(Arc::new(wrong)),
+                }
             }
         }
-        state.said.clone()
+        state
     }
 }
 
@@ -101,6 +124,7 @@ mod tests {
         assert_eq!(*after(6).unwrap(), "22");
         fs::remove_file(&path).unwrap();
         assert!(after(8).is_err(), "what is gone lets nobody in");
+        assert_eq!(*watched.last_good(), "22", "what it said before is kept");
         fs::write(&path, "333").unwrap();
         assert_eq!(*after(10).unwrap(), "333");
     }

@@ -24,6 +24,9 @@ const OF_STRANGERS: Rate = Rate {
     at_once: 20.0,
 };
 
+/// What whoever was let in may always ask for.
+const STOP: &str = "/v1/stop";
+
 /// Who was let in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Admitted {
@@ -72,14 +75,14 @@ impl Identities {
         path: &str,
     ) -> Result<Admitted, Problem> {
         let now = Instant::now();
-        let owner = self.owner(headers);
+        let owner = self.owner(headers, path);
         let owner = owner.map_err(|problem| match self.of_strangers.take(peer, now) {
             Ok(()) => problem,
             Err(_) => too_many("without a token that is known"),
         })?;
         let caller = owner.as_ref().map_or(peer, |it| &it.name);
         // A stop is never one too many.
-        if path != "/v1/stop" && self.of_each.take(caller, now).is_err() {
+        if path != STOP && self.of_each.take(caller, now).is_err() {
             return Err(too_many(&format!("by {caller}")));
         }
         Ok(match owner {
@@ -94,7 +97,7 @@ impl Identities {
         })
     }
 
-    fn owner(&self, headers: &HeaderMap) -> Result<Option<Owner>, Problem> {
+    fn owner(&self, headers: &HeaderMap, path: &str) -> Result<Option<Owner>, Problem> {
         // Without a file of tokens nobody needs one.
         let Some(tokens) = &self.tokens else {
             return Ok(None);
@@ -111,11 +114,14 @@ impl Identities {
         match tokens.owner(&token) {
             Ok(Some(owner)) => Ok(Some(owner)),
             Ok(None) => Err(unauthorized("this token is not known here")),
-            Err(_) => Err(Problem::new(
-                Code::Storage,
-                "the file of tokens was changed into one that cannot be used, so that no token is accepted",
-                "on the computer of the service `truestage token` says what is wrong with it",
-            )),
+            Err(_) if path == STOP => match tokens.owner_before(&token) {
+                Some(owner) => Ok(Some(Owner {
+                    role: Role::Viewer,
+                    ..owner
+                })),
+                None => Err(no_tokens()),
+            },
+            Err(_) => Err(no_tokens()),
         }
     }
 }
@@ -139,6 +145,14 @@ fn unauthorized(what: &str) -> Problem {
     let help = "send `Authorization: Bearer TOKEN`, or the token as the password of any name (`curl -u name`); \
                 who keeps the machine makes one with `truestage token NAME --role viewer`";
     Problem::new(Code::Unauthorized, what, help)
+}
+
+fn no_tokens() -> Problem {
+    Problem::new(
+        Code::Storage,
+        "the file of tokens was changed into one that cannot be used, so that tokens do no more than stop",
+        "a `warning` among the events, and standard error of the service, say what is wrong with it",
+    )
 }
 
 fn too_many(who: &str) -> Problem {

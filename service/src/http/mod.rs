@@ -16,6 +16,7 @@ mod places;
 mod rate;
 mod routes;
 mod state;
+mod tokens;
 
 use core::pin::pin;
 use core::time::Duration;
@@ -143,6 +144,9 @@ async fn serve_all(doors: Vec<Door>, desk: Desk, access: Access, ended: oneshot:
         let guarded = Guarded::new(door.place(), &access);
         let app = routes::router(state.clone(), guarded);
         tokio::spawn(serve(door, app, closing.clone(), open.clone()));
+    }
+    if let Some(known) = access.tokens {
+        tokio::spawn(tokens::watch(known, state.desk, closing));
     }
     drop(open);
     // Whoever opened it has gone, or wants it to end.

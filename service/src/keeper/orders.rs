@@ -36,6 +36,10 @@ impl Keeper {
             Order::Lease { request, token } => self
                 .give_lease(machine.now(), &caller, &request, token)
                 .map(Answer::Leased),
+            Order::Warn { text } => {
+                self.warn(&text);
+                Ok(Answer::Done)
+            }
             Order::Release => self.release(machine.now(), &caller).map(|()| Answer::Done),
             Order::Move { id, request } => self
                 .accept_motion(machine, &id, by, &request)
