@@ -3,7 +3,6 @@
 use std::env;
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
@@ -35,7 +34,7 @@ fn connect(at: &str) -> io::Result<Box<dyn Stream>> {
             Ok(Box::new(stream))
         }
         Some(("tcp", address)) => {
-            let stream = TcpStream::connect(address)?;
+            let stream = secure::open(address, PATIENCE)?;
             stream.set_read_timeout(Some(PATIENCE))?;
             Ok(Box::new(stream))
         }

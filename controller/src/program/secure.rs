@@ -2,7 +2,7 @@
 
 use std::env;
 use std::io;
-use std::net::TcpStream;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ pub(super) fn connect(
     let builder = builder.with_safe_default_protocol_versions();
     let builder = builder.map_err(invalid)?.with_root_certificates(roots()?);
     let config = Arc::new(builder.with_no_client_auth());
-    let mut stream = TcpStream::connect(address)?;
+    let mut stream = open(address, patience)?;
     stream.set_read_timeout(Some(patience))?;
     let mut connection = ClientConnection::new(config, name).map_err(invalid)?;
     // Whoever is not who he must be is told so here, and hears no token.
@@ -34,6 +34,18 @@ pub(super) fn connect(
         connection.complete_io(&mut stream).map_err(disbelieved)?;
     }
     Ok(StreamOwned::new(connection, stream))
+}
+
+/// A connection to the first place that `address` (`HOST:PORT`) names where somebody answers; `patience` for each.
+pub(super) fn open(address: &str, patience: Duration) -> io::Result<TcpStream> {
+    let mut refused = None;
+    for place in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&place, patience) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => refused = Some(error),
+        }
+    }
+    Err(refused.unwrap_or_else(|| invalid("this name has no address")))
 }
 
 fn roots() -> io::Result<RootCertStore> {
