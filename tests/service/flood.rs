@@ -1,6 +1,7 @@
 //! A flood, in real time: the machine's thread goes on, and a stop is heard.
 //!
-//! How late a busy computer is, no test decides (`bench/load.rs` measures it).
+//! How late a busy computer is, no test decides (`bench/load.rs` measures it): where the machine is late without a flood,
+//! too, nothing is learnt from one.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -8,13 +9,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use machine::Patience;
-use service::{Access, Caller, Edge, Listen, MachineState, Opened, Service};
+use service::{Access, Caller, Desk, Edge, Listen, MachineState, Opened, Service};
 use tests::flood::flood;
 use tests::{LINEAR, Rig, not_run, rigs, shipped_config};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::{Machine, ports};
 
 const SPAN: Duration = Duration::from_secs(4);
+/// How long nobody asks, before the flood and after it.
+const QUIET: Duration = Duration::from_secs(1);
+/// What the machine may be behind meanwhile, as a share of the time, for a flood to say anything.
+const QUIET_SHARE_MAX: f64 = 0.1;
 /// A stop that is not answered by then never is.
 const LATE: Duration = Duration::from_secs(60);
 
@@ -50,6 +55,26 @@ fn stop(address: SocketAddr) -> String {
     said.split(' ').nth(1).unwrap_or_default().to_owned()
 }
 
+/// How many seconds the machine's clock falls behind that on the wall while `body` lasts, and how many pass: the clock is
+/// published after each tick, so a thread that waits is behind.
+fn behind(desk: &Desk, body: impl FnOnce()) -> (f64, f64) {
+    let (begun, clock) = (Instant::now(), desk.machine().clock_s);
+    body();
+    let (lived, passed) = (desk.machine().clock_s - clock, begun.elapsed());
+    (passed.as_secs_f64() - lived, passed.as_secs_f64())
+}
+
+/// The same as a share of the time while nobody asks.
+fn quiet_share(desk: &Desk) -> f64 {
+    let until = Instant::now() + QUIET;
+    let (behind, passed) = behind(desk, || {
+        while let Some(left) = until.checked_duration_since(Instant::now()) {
+            thread::park_timeout(left);
+        }
+    });
+    behind / passed
+}
+
 #[test]
 fn a_machine_goes_on_in_a_flood_and_a_stop_is_heard() {
     // No bus makes a difference to it.
@@ -65,16 +90,19 @@ fn a_machine_goes_on_in_a_flood_and_a_stop_is_heard() {
     let Listen::Tcp(address) = edge.places()[0] else {
         panic!("it is TCP")
     };
-    let (begun, clock) = (Instant::now(), desk.machine().clock_s);
+    let before = quiet_share(&desk);
     let mut stops = 0;
-    thread::scope(|scope| {
-        let flooding = scope.spawn(|| flood(address, begun + SPAN));
-        while !flooding.is_finished() {
-            assert_eq!(stop(address), "200", "stop {stops}");
-            stops += 1;
-        }
+    let (behind, _) = behind(&desk, || {
+        let until = Instant::now() + SPAN;
+        thread::scope(|scope| {
+            let flooding = scope.spawn(|| flood(address, until));
+            while !flooding.is_finished() {
+                assert_eq!(stop(address), "200", "stop {stops}");
+                stops += 1;
+            }
+        });
     });
-    let (lived, passed) = (desk.machine().clock_s - clock, begun.elapsed());
+    let after = quiet_share(&desk);
     let machine = desk.machine();
     let _ = desk.end(&Caller::named("the test"));
     let _ = service.wait();
@@ -85,7 +113,15 @@ fn a_machine_goes_on_in_a_flood_and_a_stop_is_heard() {
         return not_run("a machine in a flood", &why);
     }
     assert!(stops > 0 && heard > stops, "{stops} stops, {heard} events");
-    // Its clock is published after each tick: a thread that waited for the edge would be behind by the flood.
-    let behind = passed.as_secs_f64() - lived;
-    assert!(behind < 0.5 * SPAN.as_secs_f64(), "{behind} s behind");
+    // A thread that waited for the edge would be behind by the flood.
+    if behind < 0.5 * SPAN.as_secs_f64() {
+        return;
+    }
+    let quiet = before.max(after);
+    if quiet > QUIET_SHARE_MAX {
+        let why =
+            format!("the computer was too busy: {quiet:.2} of the time behind without a flood");
+        return not_run("a machine in a flood", &why);
+    }
+    panic!("{behind} s behind in the flood, {before:.2} and {after:.2} of the time without one");
 }
