@@ -403,6 +403,92 @@ fn what_was_exported_is_imported_as_it_was() {
     }
 }
 
+/// What an export is asked with, and what is told: nothing is written.
+const REFUSED: &[(&[&str], &str)] = &[
+    (
+        &["--format", "pmac", "--name", "x"],
+        "motors of a Turbo PMAC have the numbers 1 to 32",
+    ),
+    (
+        &["--format", "linuxcnc", "--name", "x"],
+        "joints of LinuxCNC have numbers",
+    ),
+    (
+        &[
+            "--format",
+            "sinumerik-eec",
+            "--approach",
+            "mean",
+            "--name",
+            "X 1",
+        ],
+        "no name of a machine axis",
+    ),
+    (
+        &["--format", "linuxcnc", "--step", "0"],
+        "--step 0: it must be above zero",
+    ),
+    (
+        &["--format", "linuxcnc", "--step", "0.01"],
+        "more than 256 values",
+    ),
+    (
+        &["--format", "linuxcnc", "--step", "1e-9"],
+        "more than 256 values",
+    ),
+    (
+        &["--format", "linuxcnc", "--step", "1e-300"],
+        "say --step 0.236 (mm)",
+    ),
+    (
+        &[
+            "--format",
+            "sinumerik-eec",
+            "--approach",
+            "mean",
+            "--step",
+            "1e-9",
+        ],
+        "more than 5000 values",
+    ),
+    (
+        &["--format", "pmac", "--step", "1e-300"],
+        "more than 4000 values",
+    ),
+    (
+        &["--format", "pmac", "--counts", "0.001"],
+        "the axis is better without it",
+    ),
+    (
+        &["--format", "pmac", "--counts", "1e300"],
+        "is the most that is written",
+    ),
+    (
+        &["--format", "csv", "--step", "1"],
+        "writes the calibration as it is",
+    ),
+    (
+        &["--format", "csv", "--laboratory", "zzz"],
+        "--laboratory: --format csv writes the calibration as it is",
+    ),
+    (
+        &["--format", "dcc", "--approach", "mean", "--step", "3"],
+        "--approach: --format dcc has no use for it",
+    ),
+    (
+        &["--format", "dcc", "--name", "Q"],
+        "this format takes --laboratory, --country, --person",
+    ),
+    (
+        &["--format", "linuxcnc", "--laboratory", "zzz"],
+        "--laboratory: --format linuxcnc has no use for it",
+    ),
+    (
+        &["--format", "sinumerik-eec", "--counts", "3"],
+        "this format takes --approach, --step, --name",
+    ),
+];
+
 #[test]
 fn what_no_table_can_say_is_refused_or_told_and_no_file_is_written_over() {
     let stage = Stage::draw(3, Interpolation::Linear);
@@ -431,39 +517,7 @@ fn what_no_table_can_say_is_refused_or_told_and_no_file_is_written_over() {
         fs::read_to_string(here.join("x.csv")).expect("it is there"),
         "mine"
     );
-    for (words, expected) in [
-        (
-            &["--format", "pmac", "--name", "x"][..],
-            "motors of a Turbo PMAC have the numbers 1 to 32",
-        ),
-        (
-            &["--format", "linuxcnc", "--name", "x"],
-            "joints of LinuxCNC have numbers",
-        ),
-        (
-            &[
-                "--format",
-                "sinumerik-eec",
-                "--approach",
-                "mean",
-                "--name",
-                "X 1",
-            ],
-            "no name of a machine axis",
-        ),
-        (
-            &["--format", "linuxcnc", "--step", "0"],
-            "--step 0: it must be above zero",
-        ),
-        (
-            &["--format", "linuxcnc", "--step", "0.01"],
-            "more than 256 values",
-        ),
-        (
-            &["--format", "csv", "--step", "1"],
-            "writes the calibration as it is",
-        ),
-    ] {
+    for (words, expected) in REFUSED {
         check_error(&export(words).with_code(2), &[expected]);
     }
 }

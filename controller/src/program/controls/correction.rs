@@ -189,12 +189,20 @@ impl Correction {
             .collect()
     }
 
+    /// The largest deviation.
+    pub(super) fn largest(&self) -> f64 {
+        match self {
+            Self::Linear(it) => it.table().largest().value(),
+            Self::Rotary(it) => it.largest().value(),
+        }
+    }
+
     /// The largest deviation times the largest slope: what it makes to look a deviation up at the target in place of the
     /// command.
     pub(super) fn second_order(&self) -> f64 {
         match self {
-            Self::Linear(it) => it.table().largest().value() * it.steepest_slope(),
-            Self::Rotary(it) => it.largest().value() * it.steepest_slope(),
+            Self::Linear(it) => self.largest() * it.steepest_slope(),
+            Self::Rotary(it) => self.largest() * it.steepest_slope(),
         }
     }
 

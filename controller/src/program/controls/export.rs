@@ -71,6 +71,7 @@ pub(crate) struct ExportArgs {
 
 pub(crate) fn run(args: &ExportArgs, output: Output) -> Ended {
     args.format.require_settled()?;
+    require_used(args)?;
     let loaded = config::load(&args.config)?;
     let store = loaded.config.machine.store();
     let id = store.resolve(&args.id)?;
@@ -95,6 +96,38 @@ pub(crate) fn run(args: &ExportArgs, output: Output) -> Ended {
         text += &format!("\n  {line}");
     }
     output.result(&text, &value)
+}
+
+/// # Errors
+/// When an option is given that would change nothing: whoever gave it believes that it does.
+fn require_used(args: &ExportArgs) -> Result<(), Failure> {
+    let given = [
+        ("--approach", args.approach.is_some()),
+        ("--step", args.step.is_some()),
+        ("--name", args.name.is_some()),
+        ("--counts", args.counts.is_some()),
+        ("--laboratory", args.laboratory.is_some()),
+        ("--country", args.country.is_some()),
+        ("--person", args.person.is_some()),
+    ];
+    let takes = args.format.takes();
+    let useless = given
+        .iter()
+        .find(|(option, is_given)| *is_given && !takes.contains(option));
+    let Some((option, _)) = useless else {
+        return Ok(());
+    };
+    let word = args.format.word();
+    Err(Failure::Usage {
+        what: match takes {
+            [] => format!("{option}: --format {word} writes the calibration as it is"),
+            _ => format!("{option}: --format {word} has no use for it"),
+        },
+        help: match takes {
+            [] => "leave it out".into(),
+            _ => format!("leave it out; this format takes {}", takes.join(", ")),
+        },
+    })
 }
 
 /// A file that is there already is somebody's table.
@@ -181,18 +214,6 @@ fn in_columns(exported: &Exported<'_>) -> Result<Written, Failure> {
             "deviations are actual - target at each line; u: standard uncertainty",
         ),
     };
-    let asked = [
-        ("--approach", exported.side.is_some()),
-        ("--step", exported.step.is_some()),
-        ("--name", exported.name.is_some()),
-        ("--counts", exported.counts.is_some()),
-    ];
-    if let Some((option, _)) = asked.iter().find(|it| it.1) {
-        return Err(Failure::Usage {
-            what: format!("{option}: --format csv writes the calibration as it is"),
-            help: "leave it out".into(),
-        });
-    }
     let mut text = String::new();
     for line in exported.header(&[what.to_owned()]) {
         text += &format!("# {line}\n");

@@ -52,6 +52,22 @@ impl FormatName {
         value.get_name().to_owned()
     }
 
+    /// The options that it has a use for.
+    pub(super) const fn takes(self) -> &'static [&'static str] {
+        match self {
+            Self::Dcc => &["--laboratory", "--country", "--person"],
+            Self::Linuxcnc | Self::SinumerikEec => &["--approach", "--step", "--name"],
+            Self::Pmac => &["--approach", "--step", "--name", "--counts"],
+            // The calibration as it is; the others are not written.
+            Self::Csv
+            | Self::Aerotech
+            | Self::Aerotech2d
+            | Self::Acs
+            | Self::SinumerikCec
+            | Self::Etalon => &[],
+        }
+    }
+
     /// # Errors
     /// When nothing public says what a value of it does: a table with the wrong sign doubles the error.
     pub(super) fn require_settled(self) -> Result<(), Failure> {

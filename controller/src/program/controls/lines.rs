@@ -1,5 +1,7 @@
 //! Straight lines between places, as controls draw them: how many are needed, and how far they are from the curve.
 
+use units::portable::{log10, powi};
+
 use super::correction::Measure;
 use crate::Failure;
 
@@ -89,13 +91,45 @@ impl Wanted {
             parts *= 2;
         }
         best.map(|(lines, _, parts)| (lines, parts))
-            .ok_or_else(|| Failure::Usage {
-                what: format!(
-                    "this table would have more than {} values, which is what there is room for",
-                    self.max
-                ),
-                help: "say a larger distance with --step".into(),
-            })
+            .ok_or_else(|| self.no_room("say a larger distance with --step".into()))
+    }
+
+    /// Before any place is made: a step that somebody mistypes must not fill the memory.
+    ///
+    /// # Errors
+    /// When there is no room for so many `values`; `least` is a step that would do.
+    pub(super) fn require_room(&self, values: usize, least: f64) -> Result<(), Failure> {
+        if values <= self.max {
+            return Ok(());
+        }
+        let (least, unit) = (self.measure.place(least), self.measure.place_unit());
+        Err(self.no_room(format!("say --step {} ({unit})", self.rounded_up(least))))
+    }
+
+    /// A step to type: a little larger, in three digits; of a turn one that it can be divided by.
+    fn rounded_up(&self, step: f64) -> String {
+        match self.measure {
+            Measure::Length => {
+                let digit = powi(10.0, log10(step).floor() as i32 - 2);
+                units::Short((step / digit).ceil() * digit).to_string()
+            }
+            Measure::Angle => {
+                const THOUSANDTHS: usize = 360_000;
+                let mut all = (step * 1e3).ceil().max(1.0) as usize..=THOUSANDTHS;
+                let whole = all.find(|it| THOUSANDTHS.is_multiple_of(*it));
+                units::Short(whole.unwrap_or(THOUSANDTHS) as f64 / 1e3).to_string()
+            }
+        }
+    }
+
+    fn no_room(&self, help: String) -> Failure {
+        Failure::Usage {
+            what: format!(
+                "this table would have more than {} values, which is what there is room for",
+                self.max
+            ),
+            help,
+        }
     }
 
     /// Equal steps from `first` over `last`, of the smallest distance in `places` or of the step asked for.

@@ -99,6 +99,11 @@ fn lines(exported: &Exported<'_>, sides: [Side; 2]) -> Result<[Lines; 2], Failur
         measure: exported.measure(),
     };
     let step = wanted.step(&calibrated)?;
+    if exported.step.is_some() {
+        let (first, last) = (calibrated[0], calibrated[calibrated.len() - 1]);
+        let values = steps(first, last, step).saturating_add(1);
+        wanted.require_room(values, (last - first) / (ROWS_MAX - 1) as f64)?;
+    }
     let places = |parts| match exported.step {
         None => cut(&calibrated, parts),
         Some(_) => equal(&calibrated, step),

@@ -22,6 +22,12 @@ use crate::Failure;
 const ENTRIES_MAX: usize = 4000;
 /// An entry counts sixteenths of a count.
 const PER_COUNT: f64 = 16.0;
+/// The largest entry, and the longest table, in counts. The Software Reference calls them integers and states no range: these
+/// are ours. An entry is within one 24-bit word of the control, a length within 32 bits.
+const ENTRY_MAX: f64 = 8_388_607.0;
+const LENGTH_MAX: f64 = 2_147_483_647.0;
+
+const COUNTS_HELP: &str = "say the counts of the motor's encoder for a millimetre, or for a turn of a rotary axis, with --counts";
 
 /// The places of a table, in counts.
 struct Places {
@@ -62,6 +68,8 @@ pub(super) fn written(exported: &Exported<'_>) -> Result<Written, Failure> {
         true => Some(backlash(exported, &places, counts)?),
         false => None,
     };
+    require_better_than_none(exported, off)?;
+    require_held(&entries, backlash.as_ref())?;
     if backlash.is_some() {
         told.push(format!(
             "I{motor}85 must not be 0: it is the rate at which backlash is taken up"
@@ -95,6 +103,45 @@ fn counts(exported: &Exported<'_>) -> Result<f64, Failure> {
         })
 }
 
+/// # Errors
+/// When an axis without any table would be nearer to its targets: the counts are not those of its encoder.
+fn require_better_than_none(exported: &Exported<'_>, off: f64) -> Result<(), Failure> {
+    let (measure, largest) = (exported.measure(), exported.correction.largest());
+    if off <= largest {
+        return Ok(());
+    }
+    Err(Failure::Usage {
+        what: format!(
+            "--format pmac: this table would be up to {} off, and the largest deviation of the calibration is {}: the axis \
+             is better without it",
+            measure.small(off),
+            measure.small(largest)
+        ),
+        help: format!("{COUNTS_HELP}, or a smaller distance with --step"),
+    })
+}
+
+/// # Errors
+/// When a number is larger than the control holds.
+fn require_held(entries: &[i64], backlash: Option<&(i64, Vec<i64>)>) -> Result<(), Failure> {
+    let more = backlash.map(|(constant, entries)| entries.iter().chain([constant]));
+    let all = entries.iter().chain(more.into_iter().flatten());
+    let largest = all.map(|it| it.unsigned_abs()).max().unwrap_or(0);
+    match largest as f64 <= ENTRY_MAX {
+        true => Ok(()),
+        false => Err(too_large(format!(
+            "an entry of {largest} sixteenths of a count, and {ENTRY_MAX} is the most that is written"
+        ))),
+    }
+}
+
+fn too_large(what: String) -> Failure {
+    Failure::Usage {
+        what: format!("--format pmac: this table would have {what}"),
+        help: COUNTS_HELP.into(),
+    }
+}
+
 fn places(
     exported: &Exported<'_>,
     counts: f64,
@@ -108,6 +155,7 @@ fn places(
         measure: exported.measure(),
     };
     let step = wanted.step(&calibrated)?;
+    require_room(exported, &wanted, step, counts)?;
     let of = |parts: usize| match exported.measure() {
         Measure::Length => along(exported, step / parts as f64, counts),
         Measure::Angle => around_the_circle((TAU / step).round() as usize * parts, counts),
@@ -123,16 +171,63 @@ fn places(
     Ok((of(parts), lines))
 }
 
-/// Over the calibrated range, the soft limits and the zero; one spacing lies between both ends, where nothing goes.
-fn along(exported: &Exported<'_>, step: f64, counts: f64) -> Places {
+/// Before any place is made.
+///
+/// # Errors
+/// When there is no room for so many entries, or the table is longer than the control counts.
+fn require_room(
+    exported: &Exported<'_>,
+    wanted: &Wanted,
+    step: f64,
+    counts: f64,
+) -> Result<(), Failure> {
+    let (low, high) = match exported.measure() {
+        Measure::Length => reach(exported),
+        Measure::Angle => (0.0, TAU),
+    };
+    let length = (high - low + step) * counts;
+    if length > LENGTH_MAX {
+        return Err(too_large(format!(
+            "a length of {length:.3e} counts, and {LENGTH_MAX} is the most that is written"
+        )));
+    }
+    // Both ends are whole steps from the zero, and a step is a whole number of counts.
+    let spacing = spacing(step, counts) / counts;
+    let (values, least) = match exported.measure() {
+        Measure::Length => (
+            [steps(low, 0.0, spacing), steps(0.0, high, spacing)]
+                .into_iter()
+                .fold(1, usize::saturating_add),
+            (high - low) / (ENTRIES_MAX - 4) as f64 + 0.5 / counts,
+        ),
+        Measure::Angle => (
+            steps(low, high, step).saturating_add(1),
+            TAU / (ENTRIES_MAX - 1) as f64,
+        ),
+    };
+    wanted.require_room(values, least)
+}
+
+/// Whole counts.
+fn spacing(step: f64, counts: f64) -> f64 {
+    (step * counts).round().max(1.0)
+}
+
+/// The calibrated range, the soft limits and the zero.
+fn reach(exported: &Exported<'_>) -> (f64, f64) {
     let calibrated = exported.correction.places();
     let (first, last) = (calibrated[0], calibrated[calibrated.len() - 1]);
     let (low, high) = exported.soft_limits.unwrap_or((first, last));
-    let spacing = (step * counts).round().max(1.0);
+    (low.min(first).min(0.0), high.max(last).max(0.0))
+}
+
+/// Over the calibrated range, the soft limits and the zero; one spacing lies between both ends, where nothing goes.
+fn along(exported: &Exported<'_>, step: f64, counts: f64) -> Places {
+    let (low, high) = reach(exported);
+    let spacing = spacing(step, counts);
     let in_spacings = |place: f64| steps(0.0, place, spacing / counts) as i64;
-    let below = in_spacings(-low.min(first).min(0.0));
-    let above = in_spacings(high.max(last).max(0.0));
-    let below = if low.min(first) < 0.0 { below } else { 0 };
+    let below = if low < 0.0 { in_spacings(-low) } else { 0 };
+    let above = in_spacings(high);
     let length = ((below + above + 1) as f64 * spacing) as i64;
     let at = (1..=above).chain(-below..=0).collect();
     Places {

@@ -82,9 +82,13 @@ fn lines(
         measure: exported.measure(),
     };
     let asked = wanted.step(&calibrated)?;
-    let first = calibrated[0];
+    let (first, last) = (calibrated[0], calibrated[calibrated.len() - 1]);
+    wanted.require_room(
+        steps(first, last, asked).saturating_add(1),
+        (last - first) / (VALUES_MAX - 1) as f64,
+    )?;
     let count = match exported.measure() {
-        Measure::Length => steps(first, calibrated[calibrated.len() - 1], asked),
+        Measure::Length => steps(first, last, asked),
         Measure::Angle => whole_turn(asked)?,
     };
     let step = match exported.measure() {
