@@ -34,7 +34,12 @@ pub(crate) enum Order {
     /// A paused run goes on.
     Resume { run: String },
     /// A person answers the question of a run.
-    Answer { run: String, answer: AnswerRequest },
+    Answer {
+        run: String,
+        answer: AnswerRequest,
+        /// Whether whoever answers may say more than the words of the question.
+        text: Result<(), Problem>,
+    },
     /// Who may command; the token is what the holder is given.
     Lease {
         request: LeaseRequest,

@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::any::Any;
 use std::cell::RefCell;
 use std::io;
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -350,11 +351,19 @@ impl Kept {
         }
     }
 
+    /// The newest journal that a run like `task` has left unfinished.
+    fn newest_journal(&self, task: &RunTask) -> Option<PathBuf> {
+        let verb = task.request.kind.stage().text();
+        let found = self.store.interrupted_run(verb, task.group.journals());
+        found.ok().flatten().map(|it| it.journal)
+    }
+
     /// One run, from its begin to its end.
     fn run(&mut self, id: &str) {
         let Some(task) = self.keeper.borrow_mut().begin_run(id) else {
             return;
         };
+        let before = self.newest_journal(&task);
         let result = self.perform(&task);
         self.machine.leave_instrument();
         self.keeper.borrow_mut().end_procedure(id);
@@ -366,7 +375,7 @@ impl Kept {
                 self.keeper.borrow_mut().run_done(id, found);
             }
             Err(failure) if is_stop(&failure) => {
-                self.leave(&task);
+                self.leave(&task, before);
                 let mut keeper = self.keeper.borrow_mut();
                 keeper.run_interrupted(&mut self.machine, id);
             }
@@ -380,14 +389,14 @@ impl Kept {
         }
     }
 
-    /// Where a run that ended early goes on, if it is one that can.
-    fn leave(&mut self, task: &RunTask) {
-        let verb = task.request.kind.stage().text();
+    /// Where a run that ended early goes on, if it is one that can. `before` is the journal that was the newest when it
+    /// began: that of an earlier run.
+    fn leave(&mut self, task: &RunTask, before: Option<PathBuf>) {
         let begun = match &task.resume {
             Some(journal) => Some(journal.clone()),
             None if task.is_resumed => {
-                let found = self.store.interrupted_run(verb, task.group.journals());
-                found.ok().flatten().map(|it| it.journal)
+                let newest = self.newest_journal(task);
+                newest.filter(|it| before.as_ref() != Some(it))
             }
             None => None,
         };

@@ -287,6 +287,9 @@ pub struct RunView {
     /// What it waits for a person to do, when it does.
     #[serde(default)]
     pub question: Option<QuestionView>,
+    /// What the person was told after the last question.
+    #[serde(default)]
+    pub said: Vec<String>,
     /// Who stopped it, when somebody did.
     pub stopped: Option<Stopped>,
     /// Why it has no result.
@@ -343,6 +346,7 @@ impl RunView {
             steps: 0,
             can_resume: false,
             question: None,
+            said: Vec::new(),
             stopped: None,
             cause: None,
             result: serde_json::Value::Null,

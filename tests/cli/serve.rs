@@ -288,3 +288,26 @@ fn a_signal_to_the_client_stops_its_run_and_leaves_the_machine_kept() {
         assert_eq!(service.end().code, Some(0));
     }
 }
+
+/// Only who has the lease may pause or abort a run, and anybody may stop it: a Ctrl-C is never lost.
+#[test]
+fn a_signal_to_the_client_stops_everything_where_somebody_else_has_the_lease() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let service = keep(&bench);
+        let client = calibrating(&bench);
+        let body = json!({"name": "anna", "seconds": 3600});
+        let (status, lease) = ask(bench.folder(), "POST /v1/lease", &body);
+        assert_eq!(status, 200, "{lease}");
+        client.signal(Signal::SIGINT);
+        let ended = client.end();
+        assert_eq!(ended.code, Some(130), "{ended:?}");
+        for said in ["anna has the lease", "everything is stopped instead"] {
+            assert!(ended.said.contains(said), "{ended:?}");
+        }
+        let status = bench.run(&["status"]).with_code(0);
+        assert_eq!(status["axes"][0]["state"], "Standstill", "{status}");
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}

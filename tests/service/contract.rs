@@ -6,7 +6,7 @@ mod kinds;
 mod machine;
 mod motions;
 mod paused;
-mod questions;
+pub(crate) mod questions;
 mod repeated;
 mod runs;
 mod turns;

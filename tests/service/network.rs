@@ -18,6 +18,7 @@ use serde_json::{Value, json};
 use service::{Access, AccessFiles, Edge, Listen, add_token};
 use tests::LINEAR;
 
+use crate::contract::questions::stage_with_a_reader;
 use crate::stage::Stage;
 
 /// Of `localhost` and 127.0.0.1, until 2126: docs/service.md has the command that made them.
@@ -233,6 +234,48 @@ fn each_role_may_do_its_own_and_what_those_before_it_may() {
             }
         }
     });
+}
+
+#[test]
+fn an_operator_answers_with_words_and_what_is_read_of_a_calibration_is_said_by_a_commissioner() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = stage_with_a_reader(tests::rigs()[0], folder.path());
+    let files = Files::new();
+    let net = Net::new(&stage, &files);
+    let [_, operator, commissioner] = files.tokens.each_ref().map(|it| bearer(it));
+    let begin = |kind: &str| {
+        let body = json!({"kind": kind, "start": true});
+        let begun = net.ask("POST /v1/runs", &commissioner, &body);
+        assert_eq!(begun.status, 201, "{}", begun.body);
+        begun.json()["id"].as_str().unwrap().to_owned()
+    };
+    let until = |id: &str, reached: &dyn Fn(&Value) -> bool| {
+        let _passing = stage.gate.wait_for_an_end();
+        let look = || net.ask(&format!("GET /v1/runs/{id}"), &operator, &Value::Null);
+        let mut looks = core::iter::repeat_with(|| look().json()).take(10_000);
+        looks.find(reached).expect("it comes so far")
+    };
+    let zero = begin("zero");
+    until(&zero, &|run| run["state"] == "done");
+    let id = begin("calibrate");
+    let line = format!("POST /v1/runs/{id}/answers");
+    let plate = until(&id, &|run| run["question"]["what"] == "turn_plate");
+    let answer = json!({"question": plate["question"]["number"], "answer": "done"});
+    assert_eq!(net.ask(&line, &operator, &answer).status, 200);
+    let read = until(&id, &|run| run["question"]["what"] == "read_line");
+    let answer = json!({"question": read["question"]["number"], "answer": "1arcsec"});
+    let refused = net.ask(&line, &operator, &answer);
+    assert_eq!(refused.status, 403, "{}", refused.body);
+    let cause = refused.json()["cause"].to_string();
+    assert!(
+        cause.contains("role commissioner, and your token is that of an operator"),
+        "{cause}"
+    );
+    assert_eq!(net.ask(&line, &commissioner, &answer).status, 200);
+    let pause = format!("POST /v1/runs/{id}/pause");
+    assert_eq!(net.ask(&pause, &operator, &Value::Null).status, 200);
+    drop(net);
+    stage.end();
 }
 
 #[test]

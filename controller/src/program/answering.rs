@@ -5,8 +5,10 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::Failure;
+use crate::program::exchange::plain;
 use crate::program::operator::Terminal;
 use crate::program::output::Output;
+use crate::rotary::sighted::Person as _;
 
 /// One sort of question: how it is put to a person, and what his answer is for the service.
 pub(crate) struct Asked {
@@ -69,6 +71,15 @@ impl Answering {
         };
         let answer = (asked.answer)(&mut self.terminal)?;
         Ok(answer.map(|it| (number, it)))
+    }
+
+    /// The answer was not taken: the question is put again.
+    ///
+    /// # Errors
+    /// When nobody is there who could answer otherwise.
+    pub(crate) fn refuse(&mut self, why: &str) -> Result<(), Failure> {
+        self.put = None;
+        self.terminal.refuse(&plain(why))
     }
 
     fn put(&mut self, number: u64, question: &Value) -> Result<&'static Asked, Failure> {

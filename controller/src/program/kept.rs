@@ -28,6 +28,11 @@ const WAIT: Duration = Duration::from_millis(200);
 /// How often a jog is renewed: a service stops one that was not for 200 ms.
 const AGAIN: Duration = Duration::from_millis(50);
 
+/// What stops everything, and is taken from anybody.
+const STOP: &str = "/v1/stop";
+/// How runs and motions end, or wait for somebody to go on with them.
+const ENDS: [&str; 5] = ["done", "stopped", "paused", "failed", "timed_out"];
+
 /// Where the service is.
 pub(crate) struct Service {
     at: String,
@@ -119,7 +124,7 @@ impl Service {
         }
         request["uncompensated"] = json!(args.agreed.uncompensated);
         request["beyond"] = json!(args.agreed.beyond);
-        let motion = self.motion(&request, &stop)?;
+        let motion = self.motion(&request, &stop, output)?;
         let legs = motion["axes"].as_object().into_iter().flatten();
         let told = legs.map(|(axis, leg)| {
             let (text, value) = words_of(leg);
@@ -244,7 +249,7 @@ impl Service {
             false => "abort",
         };
         let ender = format!("{path}/{ending}");
-        self.end_of(&path, &ender, waiting.stop, |run| {
+        self.end_of(&path, &ender, (waiting.stop, waiting.output), |run| {
             let of = |name: &str| run[name].as_u64().unwrap_or(0);
             let axis = plain(run["of"].as_str().unwrap_or_default());
             if of("steps") > 0 {
@@ -263,9 +268,15 @@ impl Service {
             return Ok(());
         };
         let body = json!({"question": number, "answer": answer}).to_string();
-        // Somebody else may have answered or stopped it: the next look says so.
-        let _ = ask_on(&self.at, "POST", &format!("{path}/answers"), &body);
-        Ok(())
+        let Err(refused) = ask_on(&self.at, "POST", &format!("{path}/answers"), &body) else {
+            return Ok(());
+        };
+        // Somebody else may have answered or stopped it: then nothing is asked any more.
+        let now = ask_on(&self.at, "GET", path, "")?;
+        match now["question"]["number"] == number {
+            true => person.refuse(&refused.to_string()),
+            false => Ok(()),
+        }
     }
 
     /// The newest run that is paused and of the kind and axis that `request` asks for; or the one of
@@ -289,9 +300,15 @@ impl Service {
         })
     }
 
-    fn motion(&self, request: &Value, stop: &StopRequest) -> Result<Value, Failure> {
+    fn motion(
+        &self,
+        request: &Value,
+        stop: &StopRequest,
+        output: Output,
+    ) -> Result<Value, Failure> {
         let id = self.begin("/v1/motions", request)?;
-        self.end_of(&format!("/v1/motions/{id}"), "/v1/stop", stop, |_| Ok(()))
+        let path = format!("/v1/motions/{id}");
+        self.end_of(&path, STOP, (stop, output), |_| Ok(()))
     }
 
     /// The name of what was begun.
@@ -305,23 +322,26 @@ impl Service {
         &self,
         path: &str,
         ender: &str,
-        stop: &StopRequest,
+        (stop, output): (&StopRequest, Output),
         mut meanwhile: impl FnMut(&Value) -> Result<(), Failure>,
     ) -> Result<Value, Failure> {
-        let mut is_ending = false;
+        let mut is_heard = false;
         let mut trouble = None;
         loop {
-            if (stop.is_requested() || trouble.is_some()) && !is_ending {
-                is_ending = true;
-                // Refused when it has just ended, unheard when the service has: the next look says which.
-                let _ = ask_on(&self.at, "POST", ender, "{}");
+            let is_ending = stop.is_requested() || trouble.is_some();
+            if is_ending && !is_heard {
+                is_heard = self.end(path, ender, output)?;
             }
             let wait_s = WAIT.as_secs_f64();
             let seen = ask_on(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
-            if trouble.is_none() {
+            if !is_ending {
                 trouble = meanwhile(&seen).err();
             }
-            match seen["state"].as_str() {
+            let state = seen["state"].as_str();
+            if state.is_some_and(|it| ENDS.contains(&it)) {
+                say_last(&seen, output);
+            }
+            match state {
                 Some("done") => return Ok(seen),
                 Some("stopped" | "paused") if trouble.is_some() => {
                     return trouble.map_or(Ok(seen), Err);
@@ -333,6 +353,34 @@ impl Service {
                 _ => {}
             }
         }
+    }
+
+    /// Asks for the end of what is at `path`; whether that was heard. Where `ender` is refused because somebody else
+    /// has the lease, everything is stopped: that is taken from anybody.
+    fn end(&self, path: &str, ender: &str, output: Output) -> Result<bool, Failure> {
+        let Err(refused) = ask_on(&self.at, "POST", ender, "{}") else {
+            return Ok(true);
+        };
+        // It may just have ended.
+        let seen = ask_on(&self.at, "GET", path, "")?;
+        let goes_on = matches!(
+            seen["state"].as_str(),
+            Some("running" | "moving" | "queued")
+        );
+        if !goes_on || ender == STOP {
+            return Ok(false);
+        }
+        output.note(&format!(
+            "the service does not end it so: {refused}; everything is stopped instead, and what was measured is kept"
+        ));
+        Ok(ask_on(&self.at, "POST", STOP, "{}").is_ok())
+    }
+}
+
+/// What a person is told after the last question.
+fn say_last(run: &Value, output: Output) {
+    for text in run["said"].as_array().into_iter().flatten() {
+        output.note(&format!("> {}", plain(text.as_str().unwrap_or_default())));
     }
 }
 

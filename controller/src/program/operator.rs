@@ -163,11 +163,12 @@ impl Terminal {
     }
 }
 
-impl Operator for Terminal {
-    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
+impl Terminal {
+    /// Asks for the plate in the words of `text`.
+    pub(crate) fn ask_for_plate(&mut self, task: &PlateTask, text: &str) -> Result<(), Failure> {
         if let (PlateMove::TurnBy(0.0), Answers::Hand(_)) = (task.by, &self.answers) {
             // A hand that took it up would not put it down in the same place.
-            self.output.note(&format!("> {}", task.text()));
+            self.output.note(&format!("> {text}"));
             return Ok(());
         }
         let words = match task.by {
@@ -176,7 +177,18 @@ impl Operator for Terminal {
                 format!("place-plate {}", task.offset)
             }
         };
-        self.ask_for(&task.text(), &words)
+        self.ask_for(text, &words)
+    }
+
+    /// Asks for a line in the words of `text`.
+    pub(crate) fn ask_for_line(&mut self, task: &LineTask, text: &str) -> Result<(), Failure> {
+        self.ask_for(text, &line_words(task))
+    }
+}
+
+impl Operator for Terminal {
+    fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
+        self.ask_for_plate(task, &task.text())
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
@@ -226,9 +238,13 @@ impl Person for Terminal {
         match &self.answers {
             // Lines that were pasted behind it would be taken for others.
             Answers::Keyboard(answers) => forget_what_was_typed(answers),
-            Answers::Hand(_) | Answers::Nobody => Err(Failure::Usage {
+            Answers::Hand(_) => Err(Failure::Usage {
                 what: why.to_owned(),
                 help: "the emulated machine's hand answers the same question alike".into(),
+            }),
+            Answers::Nobody => Err(Failure::Usage {
+                what: why.to_owned(),
+                help: "leave --yes out, and answer at a terminal".into(),
             }),
         }
     }
@@ -295,7 +311,7 @@ fn hands_answer(socket: &Path, question: &Question) -> Result<String, Failure> {
 
 impl LineOperator for Terminal {
     fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
-        self.ask_for(&task.text(), &line_words(task))
+        self.ask_for_line(task, &task.text())
     }
 
     fn is_set_up(&mut self) -> Result<bool, Failure> {

@@ -77,7 +77,14 @@ impl Desk {
         answer: &AnswerRequest,
     ) -> Result<(), Problem> {
         let (run, answer) = (id.to_owned(), answer.clone());
-        self.done(caller, Order::Answer { run, answer })
+        self.done(
+            caller,
+            Order::Answer {
+                run,
+                answer,
+                text: Ok(()),
+            },
+        )
     }
 
     /// The run `id`.

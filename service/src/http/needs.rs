@@ -38,9 +38,13 @@ pub(super) fn enough(role: Role, needed: Role) -> Result<(), Problem> {
     if role >= needed {
         return Ok(());
     }
+    let article = match role {
+        Role::Operator => "an",
+        Role::Viewer | Role::Commissioner => "a",
+    };
     Err(Problem::new(
         Code::Forbidden,
-        format!("this needs the role {needed}, and your token is that of a {role}"),
+        format!("this needs the role {needed}, and your token is that of {article} {role}"),
         format!("ask who keeps the machine for one: `truestage token NAME --role {needed}`"),
     ))
 }

@@ -178,7 +178,7 @@ impl Keeper {
         self.ticks += 1;
         self.events.set_now(machine.now());
         self.take_notes();
-        self.take_question();
+        let asked = self.take_question(machine);
         for _ in 0..ORDERS_A_TICK {
             let Ok(letter) = self.inbox.try_recv() else {
                 break;
@@ -191,7 +191,7 @@ impl Keeper {
         };
         self.publish(machine);
         self.send_answers();
-        carried_on?;
+        asked.and(carried_on)?;
         if self.mode == Mode::Procedure && self.runs.is_to_end() {
             return Err(Failure::Interrupted);
         }

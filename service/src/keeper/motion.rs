@@ -109,6 +109,11 @@ pub(super) struct Motions {
 }
 
 impl Motions {
+    /// Whether none is under way or waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.active.is_empty()
+    }
+
     /// The list for a snapshot, the same one until something changes: those that ended, then the others.
     pub(super) fn list(&mut self, seats: &[Seat]) -> Arc<Vec<Arc<MotionView>>> {
         let (active, ended) = (&self.active, &self.ended);

@@ -58,9 +58,9 @@ impl Keeper {
             Order::Abort { run } => self.abort_run(machine, &run, by).map(|()| Answer::Done),
             Order::Pause { run } => self.pause_run(machine, &run).map(|()| Answer::Done),
             Order::Resume { run } => self.resume_run(machine, &run).map(|()| Answer::Done),
-            Order::Answer { run, answer } => {
-                self.answer_run(&run, by, &answer).map(|()| Answer::Done)
-            }
+            Order::Answer { run, answer, text } => self
+                .answer_run(&run, by, &answer, text)
+                .map(|()| Answer::Done),
             Order::Power { axis, on } => return self.power(machine, &axis, on, reply),
             Order::Calibration(choice) => return self.take_choice(choice, by, reply),
             Order::Reset => return self.take_reset(reply),
@@ -130,8 +130,16 @@ impl Keeper {
         }
     }
 
-    fn begin_power(&self, machine: &mut Machine, axis: &str, on: bool) -> Result<usize, Problem> {
+    fn begin_power(
+        &mut self,
+        machine: &mut Machine,
+        axis: &str,
+        on: bool,
+    ) -> Result<usize, Problem> {
         self.require_running()?;
+        if on {
+            self.require_no_hands()?;
+        }
         let at = self.place(axis)?;
         self.require_free(at)?;
         let failed = |it: machine::Failure| Problem::from(truestage::Failure::from(it));

@@ -1,13 +1,16 @@
-//! What a run asks a person, and the answer.
+//! What a run asks a person, and the answer. While it is something to do by hand, nothing else moves.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use machine::{Driving, Machine};
 use serde_json::json;
 use truestage::Failure;
 use truestage::runs::{Person, Question};
 
 use super::Keeper;
+use super::seat::Task;
+use super::stop::stopped_by;
 use crate::problem::{Code, Problem};
 use crate::request::AnswerRequest;
 use crate::view::QuestionView;
@@ -18,10 +21,10 @@ const ANSWER_MAX: usize = 200;
 /// What passes between a procedure that asks and whoever answers.
 #[derive(Debug, Default)]
 pub(super) struct Talk {
-    /// Asked since the last tick.
+    /// Asked, and not told yet: since the last tick, or other axes still slow down.
     asked: Option<Question>,
     answer: Option<String>,
-    /// What the next question begins with.
+    /// What the next question begins with; without one, what the run says at its end.
     said: Vec<String>,
 }
 
@@ -55,12 +58,23 @@ impl Keeper {
         Asker(Rc::clone(&self.talk))
     }
 
-    /// What was asked since the last tick becomes part of the run.
-    pub(super) fn take_question(&mut self) {
+    /// What was asked since the last tick becomes part of the run. What is to be done by hand is asked when everything
+    /// else stands and is switched off, too.
+    pub(super) fn take_question(&mut self, machine: &mut Machine) -> Result<(), machine::Failure> {
+        let Some(by_hand) = self.talk.borrow().asked.as_ref().map(|it| !it.takes_text) else {
+            return Ok(());
+        };
+        if !by_hand || self.clear_for_hands(machine)? {
+            self.put_question();
+        }
+        Ok(())
+    }
+
+    fn put_question(&mut self) {
         let Some(question) = self.talk.borrow_mut().asked.take() else {
             return;
         };
-        let Some(run) = self.runs.under_way() else {
+        let Some(run) = self.runs.running() else {
             return;
         };
         run.asked += 1;
@@ -77,12 +91,61 @@ impl Keeper {
         self.events.push("question", &id, data);
     }
 
-    /// Answers what the run `id` asks.
+    /// Stops and switches off what the run that asks does not have; whether all of that is done.
+    fn clear_for_hands(&mut self, machine: &mut Machine) -> Result<bool, machine::Failure> {
+        let Some(id) = self.runs.running().map(|it| it.view.id.clone()) else {
+            return Ok(true);
+        };
+        self.stop_motions(
+            machine,
+            &stopped_by(format!("run {id} (hands in the machine)")),
+        );
+        for seat in self.seats.iter_mut().filter(|it| it.is_free()) {
+            if seat.is_enabled(machine) {
+                Driving::of(machine, &seat.name)?.disable();
+                seat.task = Task::Power(None);
+            }
+        }
+        let is_cleared = |seat: &super::Seat| seat.is_free() || seat.is_of(&id);
+        Ok(self.motions.is_empty() && self.seats.iter().all(is_cleared))
+    }
+
+    /// Refuses what moves an axis, or switches one on, while a run has asked for something that is done by hand.
+    pub(super) fn require_no_hands(&mut self) -> Result<(), Problem> {
+        let talk = self.talk.borrow();
+        let is_next = talk.asked.as_ref().is_some_and(|it| !it.takes_text);
+        drop(talk);
+        let Some(run) = self.runs.running() else {
+            return Ok(());
+        };
+        let number = match &run.view.question {
+            Some(question) if !question.takes_text => question.number,
+            _ if is_next => run.asked + 1,
+            _ => return Ok(()),
+        };
+        let what = format!(
+            "run {} asks for something that is done by hand (question {number}): hands may be in the machine",
+            run.view.id
+        );
+        let help = "wait until it is answered, or end the run";
+        Err(Problem::new(Code::AxisBusy, what, help))
+    }
+
+    /// What a person was told after the last question.
+    pub(super) fn take_said(&mut self) -> Vec<String> {
+        let mut talk = self.talk.borrow_mut();
+        // What nobody was asked will not be.
+        talk.asked = None;
+        core::mem::take(&mut talk.said)
+    }
+
+    /// Answers what the run `id` asks. `text` is whether who answers may say more than its words.
     pub(super) fn answer_run(
         &mut self,
         id: &str,
         by: &str,
         given: &AnswerRequest,
+        text: Result<(), Problem>,
     ) -> Result<(), Problem> {
         let run = self.runs.find(id)?;
         let answer = given.answer.trim();
@@ -111,6 +174,9 @@ impl Keeper {
                 question.number
             );
             return Err(Problem::new(Code::NotAsked, what, format!("say {words}")));
+        }
+        if !is_a_word {
+            text?;
         }
         let data = json!({"number": question.number, "answer": answer, "by": by});
         run.answered = Some((question.number, answer.to_owned()));

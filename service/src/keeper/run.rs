@@ -124,6 +124,12 @@ impl Runs {
         found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
     }
 
+    /// The one that goes on, and is not to end.
+    pub(super) fn running(&mut self) -> Option<&mut Run> {
+        let run = self.under_way();
+        run.filter(|it| it.view.state == RunState::Running)
+    }
+
     pub(super) fn under_way(&mut self) -> Option<&mut Run> {
         self.published = None;
         let mut kept = self.kept.iter_mut();
@@ -308,9 +314,11 @@ impl Keeper {
     /// The procedure of the run `id` has ended.
     pub(crate) fn end_procedure(&mut self, id: &str) {
         self.mode = Mode::Idle;
+        let said = self.take_said();
         if let Ok(run) = self.runs.find(id) {
             run.is_over = true;
             run.view.question = None;
+            run.view.said = said;
         }
     }
 

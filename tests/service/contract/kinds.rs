@@ -148,6 +148,9 @@ fn three_axes_read_a_line_that_somebody_sets_up_and_stand_enabled_afterwards() {
         let judged = bed.client.run(&id, PATIENCE).unwrap();
         assert_eq!(judged.state, RunState::Done, "{judged:?}");
         assert!(judged.result["range_um"].as_f64().is_some(), "{judged:?}");
+        // Nothing is asked after it, and yet it is told.
+        let said = judged.said.join(" ");
+        assert!(said.contains("may be packed up"), "{judged:?}");
         // As any axis that stands.
         let moved = bed.begin(&to("x", 12.5));
         assert_eq!(bed.ended(&moved).state, MotionState::Done);

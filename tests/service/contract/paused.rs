@@ -51,6 +51,25 @@ fn with_short_runs(body: impl Fn(&Bed<'_>)) {
     });
 }
 
+#[test]
+fn a_run_that_is_paused_before_it_measured_goes_on_with_nothing_of_an_earlier_one() {
+    with_short_runs(|bed| {
+        let earlier = bed.calibrating(A_RUN + 2);
+        bed.client.pause(&bert(), &earlier).unwrap();
+        let left = bed.paused(&earlier).journal.expect("it measured something");
+        let id = bed.calibrating(0);
+        bed.client.pause(&bert(), &id).unwrap();
+        let paused = bed.paused(&id);
+        assert_ne!(paused.journal, Some(left.clone()), "{paused:?}");
+        bed.client.resume(&anna(), &id).unwrap();
+        let done = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(done.state, RunState::Done, "{done:?}");
+        let made_of = done.result["journal"].as_str().unwrap();
+        assert_ne!(made_of, left);
+        assert_eq!(points_in(made_of), 2 * A_RUN as usize);
+    });
+}
+
 /// How many points a journal holds.
 fn points_in(journal: &str) -> usize {
     let text = std::fs::read_to_string(journal).expect("it is there");

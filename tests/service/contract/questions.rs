@@ -4,9 +4,11 @@ use core::time::Duration;
 
 use mock_bus::fault::Fault;
 use service::{
-    AnswerRequest, AxisState, Code, QuestionView, RunKind, RunRequest, RunState, RunView, StopMode,
+    AnswerRequest, AxisState, Code, IfMoving, MotionState, MoveRequest, QuestionView, RunKind,
+    RunRequest, RunState, RunView, StopMode,
 };
-use tests::{Edit, ROTARY, Shipped, with_few_lines};
+use tests::{Edit, ROTARY, Rig, Shipped, with_few_lines};
+use units::Radians;
 
 use super::{Bed, SEED, anna, bert, each};
 use crate::client::PATIENCE;
@@ -211,6 +213,38 @@ fn the_axis_is_off_while_somebody_is_asked_and_a_stop_by_anybody_ends_that() {
 }
 
 #[test]
+fn nothing_is_moved_or_switched_on_while_hands_are_in_the_machine() {
+    with_table(|bed| {
+        let id = bed.run_of(RunKind::Calibrate);
+        let queued = MoveRequest {
+            if_moving: IfMoving::Queue,
+            uncompensated: true,
+            ..MoveRequest::of("c", Radians::from_degrees(10.0))
+        };
+        // It waits for the end of the run, which is not while somebody is asked.
+        let waits = bed.begin(&queued);
+        let question = bed.asked(&id);
+        let stopped = bed.ended(&waits);
+        assert_eq!(stopped.state, MotionState::Stopped, "{stopped:?}");
+        let by = stopped.stopped.expect("it says who").by;
+        assert!(by.contains(&id) && by.contains("hands"), "{by}");
+
+        let asked = format!("run {id} asks for something that is done by hand (question 1)");
+        let refused = bed.refused(&queued, Code::AxisBusy);
+        assert!(refused.to_string().contains(&asked), "{refused}");
+        let refused = bed.client.power(&anna(), "c", true).unwrap_err();
+        assert!(refused.to_string().contains(&asked), "{refused}");
+
+        Hand::new(bed).does(&id, &question);
+        // The table is switched on again, and its plate is read.
+        bed.let_time_pass(0.5);
+        let waits = bed.begin(&queued);
+        bed.client.stop(&bert(), StopMode::Controlled).unwrap();
+        assert_eq!(bed.ended(&waits).state, MotionState::Stopped);
+    });
+}
+
+#[test]
 fn a_run_that_waits_for_a_person_is_paused_and_goes_on_with_the_placements_that_are_read() {
     with_table(|bed| {
         let id = bed.run_of(RunKind::Calibrate);
@@ -258,13 +292,13 @@ fn the_axis_stays_supervised_while_somebody_is_asked() {
 }
 
 /// A plate of few lines on a table that these can see, which a person reads.
-fn with_a_reader(body: impl Fn(&Bed<'_>)) {
+pub(crate) fn stage_with_a_reader(rig: Rig, folder: &std::path::Path) -> Stage {
     let emulated = with_few_lines(ROTARY.emulated).edit("lines = 72", "lines = 24");
     let shipped = Shipped {
         emulated: Box::leak(emulated.into_boxed_str()),
         ..ROTARY
     };
-    let read_by_a_person = |text: String| {
+    Stage::new(rig, (shipped, SEED), folder, |text| {
         let detector =
             "[rotary.c.line_detector]       # at the drive's touch probe 1\nedge = \"positive\"";
         let sighting = "[rotary.c.sighting]\nvalue = \"to_line\"\nrange_arcsec = 200.0";
@@ -272,11 +306,11 @@ fn with_a_reader(body: impl Fn(&Bed<'_>)) {
             .edit("lines = 360", "lines = 24")
             .edit("offset_lines = 200.5", "offset_lines = 12.5")
             .edit("closure_limit_arcsec = 0.1 ", "closure_limit_arcsec = 5.0 ")
-    };
-    let new = move |rig, folder: &std::path::Path| {
-        Stage::new(rig, (shipped, SEED), folder, read_by_a_person)
-    };
-    each(new, |bed| {
+    })
+}
+
+fn with_a_reader(body: impl Fn(&Bed<'_>)) {
+    each(stage_with_a_reader, |bed| {
         bed.client.zero(&anna(), Some("c"));
         body(bed);
     });

@@ -8,20 +8,16 @@ use crate::Failure;
 use crate::program::answering::{Asked, entered, not_understood};
 use crate::program::exchange::plain;
 use crate::program::operator::Terminal;
+use crate::rotary::PlateTask;
 use crate::rotary::sighted::{self, Person as _, Question};
-use crate::rotary::{Operator as _, PlateTask};
 
 pub(crate) const ASKED: &[Asked] = &[
     Asked {
         what: PlateTask::WHAT,
-        ask: |terminal, _, task| {
+        ask: |terminal, text, task| {
             let task: PlateTask = serde_json::from_value(task.clone())
                 .map_err(|_| not_understood(PlateTask::WHAT))?;
-            terminal.ask(&PlateTask {
-                axis: plain(&task.axis),
-                plate: plain(&task.plate),
-                ..task
-            })
+            terminal.ask_for_plate(&task, &plain(text))
         },
         answer: entered,
     },

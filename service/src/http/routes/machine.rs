@@ -24,7 +24,7 @@ pub(super) async fn machine(Of(state): Of<State>) -> Json<MachineView> {
     Json(state.desk.machine())
 }
 
-/// Its linear axes.
+/// Its axes.
 #[utoipa::path(
     get, path = "/axes", tag = "machine",
     responses((status = 200, description = "All axes", body = Vec<AxisView>))

@@ -155,12 +155,16 @@ pub(super) async fn resume(
 pub(super) async fn answer(
     Of(state): Of<State>,
     By(caller): By,
+    admitted: Admitted,
     Named(id): Named,
     Body(answer): Body<AnswerRequest>,
 ) -> Result<Json<RunView>, Problem> {
+    // What is read becomes part of what the run finds.
+    let text = enough(admitted.role, of_run(state.desk.run(&id)?.kind));
     let order = Order::Answer {
         run: id.clone(),
         answer,
+        text,
     };
     obey(&state.desk, &caller, order).await?;
     Ok(Json(state.desk.run(&id)?))

@@ -31,6 +31,7 @@ impl Keeper {
         request: &MoveRequest,
     ) -> Result<(), Problem> {
         self.require_running()?;
+        self.require_no_hands()?;
         let mut motion = self.motion_of(machine.now(), id, by, request)?;
         self.plan_legs(machine, &mut motion)?;
         self.clear_the_way(machine, &motion, request.if_moving)?;

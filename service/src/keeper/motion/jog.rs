@@ -38,6 +38,7 @@ impl Keeper {
         if speed.value() == 0.0 {
             return self.end_jog(machine, going, by, &request.axis);
         }
+        self.require_no_hands()?;
         let motion = self.jog_motion(machine, id, by, request, at)?;
         match going {
             // The other way, or at another speed: from rest.
