@@ -244,6 +244,76 @@ fn nothing_is_moved_or_switched_on_while_hands_are_in_the_machine() {
     });
 }
 
+/// The drive of a second axis, which has no mechanics.
+const SECOND_DRIVE: &str = r#"
+[[nodes]]
+name = "second"
+port = "can0"
+[nodes.device]
+kind = "cia402_drive"
+node_id = 3
+axis = 1
+identity = { vendor_id = 0x7FF, product_code = 0x42_0002, revision = 0x1_0000, serial_number = 3003 }
+boot_delay_ms = 100
+heartbeat_ms = 0
+quick_stop_option = 6
+abort_connection_option = 3
+"#;
+
+/// The table `c`, and an axis `d` on the same bus.
+fn with_a_second_axis(body: impl Fn(&Bed<'_>)) {
+    let part = |text: &str, from: &str, to: &str| {
+        let begin = text.find(from).expect("it is there");
+        let end = text[begin..].find(to).expect("it is there");
+        text[begin..begin + end].to_owned()
+    };
+    let emulated = ROTARY.emulated;
+    let rotary = part(
+        emulated,
+        "[nodes.device.rotary]",
+        "[nodes.device.touch_probe]",
+    );
+    let emulated = [emulated, SECOND_DRIVE, &rotary].concat();
+    let shipped = Shipped {
+        emulated: Box::leak(emulated.into_boxed_str()),
+        ..ROTARY
+    };
+    let new = move |rig, folder: &std::path::Path| {
+        Stage::new(rig, (shipped, SEED), folder, |text| {
+            let second = part(&text, "[rotary.c]", "[rotary.c.zero]")
+                .edit("[rotary.c]", "[rotary.d]")
+                .edit("[rotary.c.identity]", "[rotary.d.identity]")
+                .edit("node_id = 1", "node_id = 3");
+            few_placements(text) + "\n" + &second
+        })
+    };
+    each(new, |bed| {
+        bed.client.zero(&anna(), Some("c"));
+        body(bed);
+    });
+}
+
+#[test]
+fn other_axes_are_switched_off_before_somebody_is_asked_and_stay_so_until_he_has_answered() {
+    with_a_second_axis(|bed| {
+        bed.client.power(&anna(), "d", true).unwrap();
+        assert_eq!(bed.client.axis("d").unwrap().state, AxisState::Standstill);
+        let calibrate = RunRequest::of(RunKind::Calibrate, Some("c"));
+        let id = bed.client.plan(&anna(), &calibrate).unwrap();
+        let question = bed.asked(&id);
+        assert_eq!(bed.client.axis("d").unwrap().state, AxisState::Disabled);
+        let refused = bed.client.power(&anna(), "d", true).unwrap_err();
+        assert_eq!(refused.code, Code::AxisBusy);
+        let said = refused.to_string();
+        assert!(said.contains(&id) && said.contains("question 1"), "{said}");
+        bed.client.power(&anna(), "d", false).unwrap();
+        Hand::new(bed).does(&id, &question);
+        assert_eq!(bed.client.axis("d").unwrap().state, AxisState::Disabled);
+        bed.client.power(&anna(), "d", true).unwrap();
+        bed.client.abort(&anna(), &id).unwrap();
+    });
+}
+
 #[test]
 fn a_run_that_waits_for_a_person_is_paused_and_goes_on_with_the_placements_that_are_read() {
     with_table(|bed| {
