@@ -107,7 +107,7 @@ fn counts(exported: &Exported<'_>) -> Result<f64, Failure> {
 /// When an axis without any table would be nearer to its targets: the counts are not those of its encoder.
 fn require_better_than_none(exported: &Exported<'_>, off: f64) -> Result<(), Failure> {
     let (measure, largest) = (exported.measure(), exported.correction.largest());
-    if off <= largest {
+    if off <= largest.max(measure.harmless()) {
         return Ok(());
     }
     Err(Failure::Usage {
