@@ -123,6 +123,14 @@ pub fn size([x, y, z]: Off) -> Metres {
     Metres(x.value().hypot(y.value()).hypot(z.value()))
 }
 
+/// By how much each of the errors is another one than was expected.
+pub fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
+    let pairs = errors.iter().zip(expected);
+    pairs
+        .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
+        .collect()
+}
+
 /// The size that 95 % of the errors do not exceed.
 ///
 /// # Panics

@@ -9,12 +9,12 @@
 
 use core::f64::consts::TAU;
 
-use crate::uncertainty::combine;
 use units::{Approach, Metres};
 
 use super::ScrewModel;
 use super::engagement::{Engagement, Play, SNAP, ScrewMemory};
 use super::limits::{Limits, ScrewError, check_limits, check_model, play_of};
+use crate::uncertainty::combine;
 
 /// Newton's steps before bisection; three do for slopes below 1e-2.
 const NEWTON_STEPS: usize = 12;

@@ -8,7 +8,7 @@ use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::linear::{LinearTeller, VerifyOptions};
-use crate::run::{CalibrateOptions, missing};
+use crate::run::missing;
 use crate::runs::{Found, Group, GroupRuns, Planned, Task, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
@@ -52,12 +52,8 @@ fn perform(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     }
 }
 
-fn words(work: &Work<'_>) -> Option<&'static LinearTeller> {
-    work.teller?.of()
-}
-
 fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<LinearTeller>();
     let zeroed = work.machine.linear(axis)?.zero(work.store)?;
     let estimate = &zeroed.estimate;
     Ok(Found {
@@ -73,12 +69,8 @@ fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
 }
 
 fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
-    let options = CalibrateOptions {
-        resume: task.resume.clone(),
-        accept_drift: task.accept_drift,
-        ..CalibrateOptions::default()
-    };
-    let words = words(&work);
+    let options = task.calibrate_options();
+    let words = work.words::<LinearTeller>();
     let mut stage = work.machine.linear(axis)?;
     let made = stage.calibrate(work.store, &options)?;
     Ok(Found {
@@ -95,7 +87,7 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
 }
 
 fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<LinearTeller>();
     let compensated = !task.uncompensated;
     let calibration = match compensated {
         true => work.machine.linear(axis)?.load_active(work.store)?,

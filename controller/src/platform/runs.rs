@@ -78,12 +78,8 @@ fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
     }
 }
 
-fn words(work: &Work<'_>) -> Option<&'static PlatformTeller> {
-    work.teller?.of()
-}
-
 fn zero(work: Work<'_>) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<PlatformTeller>();
     let zeroed = work.machine.platform()?.zero(work.store)?;
     let datum = zeroed.datum;
     Ok(Found {
@@ -99,7 +95,7 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
 }
 
 fn calibrate(work: Work<'_>) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<PlatformTeller>();
     let made = work.machine.platform()?.calibrate(work.store)?;
     Ok(Found {
         figures: json!({
@@ -113,7 +109,7 @@ fn calibrate(work: Work<'_>) -> Result<Found, Failure> {
 }
 
 fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<PlatformTeller>();
     let compensated = !task.uncompensated;
     let mut platform = work.machine.platform()?;
     if compensated {

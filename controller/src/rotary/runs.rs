@@ -16,7 +16,7 @@ use crate::rotary::RotaryTeller;
 use crate::rotary::asked::Asking;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::table::RotaryTable;
-use crate::run::{CalibrateOptions, missing};
+use crate::run::missing;
 use crate::runs::{Found, Group, GroupRuns, Planned, Task, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
@@ -140,12 +140,8 @@ fn perform(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     }
 }
 
-fn words(work: &Work<'_>) -> Option<&'static RotaryTeller> {
-    work.teller?.of()
-}
-
 fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<RotaryTeller>();
     work.machine.rotary(axis)?.zero()?;
     Ok(Found {
         figures: json!({}),
@@ -155,12 +151,8 @@ fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
 }
 
 fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
-    let options = CalibrateOptions {
-        resume: task.resume.clone(),
-        accept_drift: task.accept_drift,
-        ..CalibrateOptions::default()
-    };
-    let words = words(&work);
+    let options = task.calibrate_options();
+    let words = work.words::<RotaryTeller>();
     let mut table = work.machine.rotary(axis)?;
     table.require_driven()?;
     let (store, mut person) = (work.store, Asking(work.person));
@@ -182,7 +174,7 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
 
 fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     let compensated = !task.uncompensated;
-    let words = words(&work);
+    let words = work.words::<RotaryTeller>();
     let mut table = work.machine.rotary(axis)?;
     table.require_driven()?;
     let (store, mut person) = (work.store, Asking(work.person));

@@ -1,5 +1,6 @@
 //! What is run, what it will take, and what came of it.
 
+use core::any::Any;
 use core::time::Duration;
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use super::person::Person;
 use super::teller::{Teller, Told};
 use crate::connected::Machine;
 use crate::failure::Failure;
+use crate::run::CalibrateOptions;
 
 /// A run that is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +26,17 @@ pub struct Task {
     pub accept_drift: bool,
     /// Verify: as found, without the calibration.
     pub uncompensated: bool,
+}
+
+impl Task {
+    /// The same for a verb that calibrates one axis.
+    pub(crate) fn calibrate_options(&self) -> CalibrateOptions {
+        CalibrateOptions {
+            resume: self.resume.clone(),
+            accept_drift: self.accept_drift,
+            ..CalibrateOptions::default()
+        }
+    }
 }
 
 /// How far something goes.
@@ -54,6 +67,13 @@ pub(crate) struct Work<'w> {
     pub(crate) store: &'w Store,
     pub(crate) person: &'w mut dyn Person,
     pub(crate) teller: Option<&'w Teller>,
+}
+
+impl Work<'_> {
+    /// The words of the kind whose they are, where somebody wants to be told.
+    pub(crate) fn words<W: Any>(&self) -> Option<&'static W> {
+        self.teller?.of()
+    }
 }
 
 /// What a run found.

@@ -93,12 +93,8 @@ fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
     }
 }
 
-fn words(work: &Work<'_>) -> Option<&'static VolumetricTeller> {
-    work.teller?.of()
-}
-
 fn zero(work: Work<'_>) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<VolumetricTeller>();
     work.machine.volumetric()?.zero()?;
     Ok(Found {
         figures: json!({}),
@@ -108,7 +104,7 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
 }
 
 fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<VolumetricTeller>();
     let (store, resume) = (work.store, task.resume.as_deref());
     let mut volume = work.machine.volumetric()?;
     let made = volume.calibrate(store, WarmUp::None, resume, &mut Asking(work.person))?;
@@ -126,7 +122,7 @@ fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
 }
 
 fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<VolumetricTeller>();
     let by = match task.uncompensated {
         true => VerifyBy::AsFound,
         false => VerifyBy::Everything,
@@ -147,7 +143,7 @@ fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
 }
 
 fn reference(work: Work<'_>) -> Result<Found, Failure> {
-    let words = words(&work);
+    let words = work.words::<VolumetricTeller>();
     let taken = work.machine.volumetric()?.reference(work.store)?;
     Ok(Found {
         figures: json!({"references": taken.id, "geometry": taken.references.content.geometry}),

@@ -8,7 +8,7 @@ use machine::engine::{Lack, Live, Source, Validity};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::plant::BeamPlace;
 use tests::volume::{
-    Frame, Off, Volume, by_short_ways, calm, good, largest, percentile_95, point_mm, quick,
+    Frame, Off, Volume, beyond, by_short_ways, calm, good, largest, percentile_95, point_mm, quick,
     random_places, spread,
 };
 use tests::{Edit, judged_of_each, seeds, with_emulated_spot_cameras, with_spot_cameras};
@@ -155,13 +155,6 @@ fn stand(volume: &mut Volume, mover: &mut Mover, places: &[[f64; 3]]) -> Vec<Off
         volume.off(there)
     };
     places.iter().map(one).collect()
-}
-
-fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
-    let pairs = errors.iter().zip(expected);
-    pairs
-        .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
-        .collect()
 }
 
 /// What is seen on the way counts for where the axis was: the memory is recorded while it moves.

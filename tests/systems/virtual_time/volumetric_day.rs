@@ -16,7 +16,7 @@ use core::ops::Range;
 use core::time::Duration;
 
 use tests::volume::{
-    Frame, Off, Volume, by_short_ways, calm, good, largest, largest_range, percentile_95,
+    Frame, Off, Volume, beyond, by_short_ways, calm, good, largest, largest_range, percentile_95,
     random_places, spread,
 };
 use tests::{Bench, Coverage, Edit, VOLUMETRIC, normal, of_each, seeds};
@@ -54,14 +54,10 @@ struct AsFound {
 impl AsFound {
     fn of(places: &[[f64; 3]], now: &[Off], morning: &[Off]) -> Self {
         let seen = Frame::of(places, now).all_seen(places, now);
-        let pairs = now.iter().zip(morning);
-        let drift: Vec<Off> = pairs
-            .map(|(now, then)| core::array::from_fn(|k| now[k] - then[k]))
-            .collect();
         Self {
             error: percentile_95(&seen),
             range: largest_range(&seen),
-            drift: percentile_95(&drift),
+            drift: percentile_95(&beyond(now, morning)),
         }
     }
 }

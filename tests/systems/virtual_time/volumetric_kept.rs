@@ -5,7 +5,7 @@ use core::time::Duration;
 use compensator::volumetric::Axis;
 use compensator::volumetric::online::{Memories, StateMap};
 use tests::Edit;
-use tests::volume::{Off, Volume, calm, good, largest, percentile_95, size, spread};
+use tests::volume::{Off, Volume, beyond, calm, good, largest, percentile_95, size, spread};
 use truestage::volumetric::{MemoryName, VolumetricState};
 use units::{Metres, Time};
 
@@ -49,13 +49,6 @@ fn deliberate(volume: &Volume, places: &[[f64; 3]]) -> Vec<Off> {
         };
         places.iter().map(one).collect()
     })
-}
-
-fn beyond(errors: &[Off], expected: &[Off]) -> Vec<Off> {
-    let pairs = errors.iter().zip(expected);
-    pairs
-        .map(|(a, b)| core::array::from_fn(|k| a[k] - b[k]))
-        .collect()
 }
 
 /// The x guide bows by 15 um, and its slide pitches along: the first memory lets the tool follow.

@@ -111,14 +111,11 @@ impl VolumetricEvaluated {
 
     /// How sure all errors are together, all over the volume.
     fn covariance(&self, config: &VolumetricConfig) -> Option<ErrorCovariance> {
-        let even = |k: usize| {
-            let (low, high) = (config.low_mm[k], config.high_mm[k]);
-            let inner = |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
-            // Rounding must not put the last place outside the nodes.
-            let all = (0..PLACES).map(inner).chain([high]);
+        let along = |k: usize| {
+            let all = places(config.low_mm[k], config.high_mm[k]);
             all.map(Metres::from_mm).collect()
         };
-        self.found.covariance([even(0), even(1), even(2)])
+        self.found.covariance([along(0), along(1), along(2)])
     }
 
     /// Proves that the readings agree, and that the machine of `config` can be corrected by what was
@@ -286,19 +283,18 @@ fn thermal_of(
 
 /// At the tool in use, over places all over the volume.
 fn largest_u(entry: &VolumePlanEntry, found: &Identified, shown: &[Celsius]) -> Metres {
-    let (low, high) = (entry.low_m, entry.high_m);
-    let mut largest = Metres::ZERO;
-    for n in 0..(PLACES + 1).pow(3) {
-        let steps = [
-            n % (PLACES + 1),
-            n / (PLACES + 1) % (PLACES + 1),
-            n / (PLACES + 1).pow(2),
-        ];
-        let at = core::array::from_fn(|k| {
-            low[k] + (high[k] - low[k]) * f64::from(steps[k]) / f64::from(PLACES)
-        });
+    let along = |k: usize| places(entry.low_m[k], entry.high_m[k]);
+    let u_at = |at: [f64; 3]| {
         let u = found.standard_uncertainty(point(at), point(entry.tool_m), shown);
-        largest = largest.max(u.map_or(Metres::ZERO, |it| it.distance()));
-    }
-    largest
+        u.map_or(Metres::ZERO, |it| it.distance())
+    };
+    let rows = along(2).flat_map(|z| along(1).map(move |y| (y, z)));
+    let all = rows.flat_map(|(y, z)| along(0).map(move |x| [x, y, z]));
+    all.map(u_at).fold(Metres::ZERO, Metres::max)
+}
+
+/// Places along one axis. Rounding must not put the last one outside the nodes, where nothing is known.
+fn places(low: f64, high: f64) -> impl Iterator<Item = f64> {
+    let inner = move |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
+    (0..PLACES).map(inner).chain([high])
 }
