@@ -54,7 +54,11 @@ fn meetings() -> Vec<(Rig, Meet)> {
 }
 
 fn each(new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
-    for (rig, meet) in meetings() {
+    each_of(meetings(), new, body);
+}
+
+fn each_of(meetings: Vec<(Rig, Meet)>, new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
+    for (rig, meet) in meetings {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let stage = new(rig, folder.path());
         let client = meet(&stage);
@@ -76,10 +80,23 @@ fn with_zeroed_stage(body: impl Fn(&Bed<'_>)) {
     });
 }
 
+/// The same where no bus is: for what is told alike on any.
+fn with_zeroed_stage_in_process(body: impl Fn(&Bed<'_>)) {
+    let mut meetings = meetings();
+    meetings.retain(|it| it.0 == Rig::InProcess);
+    each_of(meetings, linear, |bed| {
+        bed.client.zero(&anna(), None);
+        body(bed);
+    });
+}
+
+fn linear(rig: Rig, folder: &Path) -> Stage {
+    Stage::new(rig, (LINEAR, SEED), folder, patient)
+}
+
 /// A linear stage as it is after its start, on each interface.
 fn with_stage(body: impl Fn(&Bed<'_>)) {
-    let new = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, patient);
-    each(new, body);
+    each(linear, body);
 }
 
 /// Three axes that have their zero, on each interface.

@@ -50,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service",
         ],
     ),
+    ("unit-tests", &["units", "wire", "drivers", "compensator"]),
 ];
 
 /// The only files of the controller that may name the emulator.
@@ -152,7 +153,7 @@ fn nowhere(folder: &str, words: &[&str], why: &str) {
 #[test]
 fn packages_depend_only_on_those_below_them() {
     let members: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
-    for folder in PACKAGES.iter().chain(&["tests"]) {
+    for folder in PACKAGES.iter().chain(&["tests", "tests/unit"]) {
         let text = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
         let manifest: toml::Table = text.parse().unwrap();
         let package = manifest["package"]["name"].as_str().unwrap();
@@ -391,7 +392,7 @@ fn no_test_edits_a_text_without_noticing_that_nothing_matched() {
 
 #[test]
 fn every_name_in_the_rules_for_running_tests_is_one_of_tests() {
-    const SYNTAX: &[&str] = &["package", "binary", "test", "not", "mock", "bus"];
+    const SYNTAX: &[&str] = &["package", "binary", "test", "not", "mock", "bus", "unit"];
     let text = fs::read_to_string(root().join(".config/nextest.toml")).unwrap();
     let config: toml::Table = text.parse().unwrap();
     let overrides = config["profile"]["default"]["overrides"]

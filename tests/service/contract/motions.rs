@@ -6,7 +6,7 @@ use tests::{Edit, LINEAR};
 
 use super::{
     Bed, SEED, anna, bert, compensated, each, length, slowly, to, with_stage, with_three_axes,
-    with_zeroed_stage,
+    with_zeroed_stage, with_zeroed_stage_in_process,
 };
 use crate::stage::Stage;
 
@@ -126,51 +126,57 @@ fn a_quick_stop_ends_motions_as_stopped_and_switches_the_drive_off() {
     });
 }
 
-/// Line 4: each fault of the drive or its bus ends the motion as failed with its cause.
+/// Line 4: each fault of the drive or its bus ends the motion as failed with its cause. A heartbeat that stays away, a
+/// drive that says what happened and a bus that is gone on every bus, the others in-process.
 #[test]
 fn a_fault_fails_the_motion_with_its_cause_and_nothing_moves_before_a_reset() {
     let drive = || "drive".to_owned();
-    let cases = [
+    let link = Fault::LinkDown {
+        port: "can0".into(),
+    };
+    let everywhere = [
         (Fault::StopHeartbeat { node: drive() }, &[Code::Silent][..]),
-        (Fault::StopPdos { node: drive() }, &[Code::Silent]),
         (Fault::SafeTorqueOff, &[Code::DriveState, Code::Alarm]),
+        // An adapter on a serial line says nothing of its bus: what stays away does.
+        (link, &[Code::Device, Code::Silent]),
+    ];
+    for (fault, codes) in everywhere {
+        with_zeroed_stage(|bed| check_fails(bed, &fault, codes));
+    }
+    let in_process = [
+        (Fault::StopPdos { node: drive() }, &[Code::Silent][..]),
         (
             Fault::PowerLoss { node: drive() },
             &[Code::Restarted, Code::Silent],
-        ),
-        (
-            Fault::LinkDown {
-                port: "can0".into(),
-            },
-            // An adapter on a serial line says nothing of its bus: what stays away does.
-            &[Code::Device, Code::Silent],
         ),
         (
             Fault::BlockedAxis { axis: 0 },
             &[Code::FollowingError, Code::DriveState, Code::Alarm],
         ),
     ];
-    for (fault, codes) in cases {
-        with_zeroed_stage(|bed| {
-            let id = bed.begin(&slowly("x", 30.0));
-            bed.under_way(&id);
-            let injected = bed.stage.inject(fault.clone());
-            let view = bed.ended(&id);
-            assert_eq!(view.state, MotionState::Failed, "{fault:?}: {view:?}");
-            let cause = view.cause.expect("it has a cause");
-            assert!(codes.contains(&cause.code), "{fault:?}: {cause:?}");
-            assert!(
-                bed.stage.deliveries(injected) > 0,
-                "{fault:?} was delivered"
-            );
-            assert_eq!(bed.client.machine().state, MachineState::ErrorStop);
-            let axis = bed.client.axis("x").unwrap();
-            assert_eq!(axis.state, AxisState::ErrorStop);
-            assert_eq!(axis.last_cause.as_ref(), Some(&cause));
-            let refused = bed.refused(&to("x", 1.0), Code::ErrorStop);
-            assert!(refused.detail().contains(&cause.cause), "{refused}");
-        });
+    for (fault, codes) in in_process {
+        with_zeroed_stage_in_process(|bed| check_fails(bed, &fault, codes));
     }
+}
+
+fn check_fails(bed: &Bed<'_>, fault: &Fault, codes: &[Code]) {
+    let id = bed.begin(&slowly("x", 30.0));
+    bed.under_way(&id);
+    let injected = bed.stage.inject(fault.clone());
+    let view = bed.ended(&id);
+    assert_eq!(view.state, MotionState::Failed, "{fault:?}: {view:?}");
+    let cause = view.cause.expect("it has a cause");
+    assert!(codes.contains(&cause.code), "{fault:?}: {cause:?}");
+    assert!(
+        bed.stage.deliveries(injected) > 0,
+        "{fault:?} was delivered"
+    );
+    assert_eq!(bed.client.machine().state, MachineState::ErrorStop);
+    let axis = bed.client.axis("x").unwrap();
+    assert_eq!(axis.state, AxisState::ErrorStop);
+    assert_eq!(axis.last_cause.as_ref(), Some(&cause));
+    let refused = bed.refused(&to("x", 1.0), Code::ErrorStop);
+    assert!(refused.detail().contains(&cause.cause), "{refused}");
 }
 
 /// Line 4, afterwards: a reset starts the machine anew, and the axis has to be zeroed again.

@@ -88,30 +88,18 @@ fn a_table_under_a_column_is_calibrated_and_corrected_away_from_zero_too() {
     assert!(cold <= 2.0 && warm <= 2.0, "{cold} um cold, {warm} um warm");
 }
 
-/// Whoever states the order of the axes wrongly gets no calibration: the readings contradict one another.
+/// Whoever states the order of the axes wrongly gets no calibration: the readings contradict one another. Here the machine
+/// is another one than usual; machines as usual of which another order is stated are in `volumetric_cause`.
 #[test]
 fn a_chain_that_is_stated_wrongly_is_never_stored() {
-    let in_text = |text: String, chain: &str| match chain {
-        "FXYZ" => text,
-        other => text.edit("chain = \"FXYZ\" ", &format!("chain = \"{other}\" ")),
-    };
-    for (seed, real, stated) in [
-        (1, "XFYZ", "FXYZ"),
-        (2, "FXYZ", "XFYZ"),
-        (3, "FXYZ", "FYXZ"),
-    ] {
-        let mut volume = Volume::zeroed(
-            seed,
-            |text| in_text(calm(text), real),
-            |text| in_text(text, stated),
-        );
-        let store = volume.bench.store.clone();
-        let mut hand = volume.bench.emulated.clone();
-        let mut work = volume.bench.machine.volumetric().unwrap();
-        let made = work.calibrate(&store, WarmUp::Idle(WARM_UP), None, &mut hand);
-        let text = made.err().map(|failure| failure.to_string());
-        let text = text.unwrap_or_else(|| panic!("seed {seed}: {real} was stored as {stated}"));
-        assert!(text.contains("nothing was stored"), "{text}");
-        assert!(text.contains("scatter"), "{text}");
-    }
+    let built = |text: String| text.edit("chain = \"FXYZ\" ", "chain = \"XFYZ\" ");
+    let mut volume = Volume::zeroed(2, calm, built);
+    let store = volume.bench.store.clone();
+    let mut hand = volume.bench.emulated.clone();
+    let mut work = volume.bench.machine.volumetric().unwrap();
+    let made = work.calibrate(&store, WarmUp::Idle(WARM_UP), None, &mut hand);
+    let text = made.err().map(|failure| failure.to_string());
+    let text = text.expect("a table under the column was stored as one that is fixed");
+    assert!(text.contains("nothing was stored"), "{text}");
+    assert!(text.contains("scatter"), "{text}");
 }
