@@ -1,5 +1,7 @@
 //! GTC computes the same uncertainties, degrees of freedom and covariances from the same budgets.
 
+mod places;
+
 use compensator::budget::{AxisBudget, Contribution, Correlation, Evaluation};
 use serde_json::{Value, json};
 use tests::random;

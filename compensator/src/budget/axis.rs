@@ -2,33 +2,7 @@
 
 use units::{Approach, Metres};
 
-use super::{Combined, Contribution, Correlation, combine_shares};
-
-/// Why contributions make no budget.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum BudgetError {
-    /// A number that no uncertainty has.
-    #[error("uncertainty budget, `{name}`: {what} is {seen}")]
-    Value {
-        /// Which contribution.
-        name: String,
-        /// Which of its numbers.
-        what: &'static str,
-        /// That number.
-        seen: f64,
-    },
-    /// Positions that were measured once only.
-    #[error("uncertainty budget: no position was measured twice with approach `{}`, so that \
-         nothing is known of the scatter of a reading; measure at least two runs",
-        approach.symbol())]
-    NoScatter {
-        /// Which approach.
-        approach: Approach,
-    },
-    /// Fewer than two positions, or not one behind the other.
-    #[error("uncertainty budget: its positions do not increase, or there are fewer than two")]
-    Positions,
-}
+use super::{BudgetError, Combined, Contribution, Correlation, combine_shares};
 
 /// What contributes to the uncertainty of an axis that was calibrated at some positions.
 ///
@@ -101,7 +75,7 @@ impl AxisBudget {
         contributions: Vec<Contribution>,
         positions: Vec<Metres>,
     ) -> Result<Self, BudgetError> {
-        contributions.iter().try_for_each(check)?;
+        contributions.iter().try_for_each(Contribution::check)?;
         let increases = |it: &[Metres]| it[1] > it[0];
         if positions.len() < 2 || !positions.windows(2).all(increases) {
             return Err(BudgetError::Positions);
@@ -164,7 +138,7 @@ impl AxisBudget {
     fn product(&self, it: &Contribution, one: &Place, other: &Place, same_approach: bool) -> f64 {
         let own = it.value * it.sensitivity;
         let factor = match it.correlation {
-            Correlation::CommonOffset => 1.0,
+            Correlation::CommonOffset | Correlation::SharedReadings => 1.0,
             Correlation::CommonScale => one.position.value() * other.position.value(),
             Correlation::Independent if !same_approach => 0.0,
             Correlation::Independent => [one.before, one.before + 1]
@@ -193,33 +167,4 @@ impl AxisBudget {
             share,
         })
     }
-}
-
-fn check(it: &Contribution) -> Result<(), BudgetError> {
-    let freedom = it.degrees_of_freedom.unwrap_or(1.0);
-    let judged = [
-        (
-            "the standard uncertainty",
-            it.value,
-            it.value >= 0.0 && it.value.is_finite(),
-        ),
-        (
-            "the sensitivity",
-            it.sensitivity,
-            it.sensitivity.is_finite(),
-        ),
-        (
-            "the number of degrees of freedom",
-            freedom,
-            freedom > 0.0 && freedom.is_finite(),
-        ),
-    ];
-    let wrong = judged.into_iter().find(|(_, _, is_sound)| !is_sound);
-    wrong.map_or(Ok(()), |(what, seen, _)| {
-        Err(BudgetError::Value {
-            name: it.name.clone(),
-            what,
-            seen,
-        })
-    })
 }

@@ -12,6 +12,9 @@
 //! | U = k·u_c | [`Combined::expanded`], k = [`COVERAGE_FACTOR`] |
 //! | u(y_1, y_2) | [`AxisBudget::covariance`] |
 //!
+//! An [`AxisBudget`] knows how each contribution depends on the position; a [`PlacesBudget`] is told its
+//! sensitivity at each place, which comes out of a fit.
+//!
 //! The inputs are independent of one another. What one input does at two places is correlated, and
 //! [`Correlation`] says how: a thermometer that shows too much stretches every length by the same
 //! share, a datum that was read wrongly shifts every place by the same length, and the scatter of
@@ -21,15 +24,48 @@
 //! with k = 2, which is 95 % where the effective degrees of freedom are many).
 
 mod axis;
+mod places;
 
-pub use axis::{AxisBudget, BudgetError};
+pub use axis::AxisBudget;
+pub use places::PlacesBudget;
 
-use units::{Approach, Metres};
+use units::{Approach, Metres, Quantity};
 
 use crate::uncertainty::combine;
 
 /// The factor from a standard uncertainty to the expanded one that is stated.
 pub const COVERAGE_FACTOR: f64 = 2.0;
+
+/// Why contributions make no budget.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BudgetError {
+    /// A number that no uncertainty has.
+    #[error("uncertainty budget, `{name}`: {what} is {seen}")]
+    Value {
+        /// Which contribution.
+        name: String,
+        /// Which of its numbers.
+        what: &'static str,
+        /// That number.
+        seen: f64,
+    },
+    /// Positions that were measured once only.
+    #[error("uncertainty budget: no position was measured twice with approach `{}`, so that \
+         nothing is known of the scatter of a reading; measure at least two runs",
+        approach.symbol())]
+    NoScatter {
+        /// Which approach.
+        approach: Approach,
+    },
+    /// Fewer than two positions, or not one behind the other.
+    #[error("uncertainty budget: its positions do not increase, or there are fewer than two")]
+    Positions,
+    /// No place, or one with another number of sensitivities than there are contributions.
+    #[error(
+        "uncertainty budget: there is no place, or one has not a sensitivity for each contribution"
+    )]
+    Sensitivities,
+}
 
 /// How a standard uncertainty was found (GUM 4.2 and 4.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +87,9 @@ pub enum Correlation {
     Independent,
     /// Nothing at the calibrated positions, most half-way between two of them.
     BetweenPositions,
+    /// What a fit makes of readings that all places share, told by the sensitivities at each of them; on an
+    /// axis the same length everywhere.
+    SharedReadings,
 }
 
 /// One line of a budget.
@@ -84,7 +123,8 @@ impl Contribution {
             Correlation::CommonScale => own * distance.abs().value(),
             Correlation::CommonOffset
             | Correlation::Independent
-            | Correlation::BetweenPositions => own,
+            | Correlation::BetweenPositions
+            | Correlation::SharedReadings => own,
         })
     }
 
@@ -92,20 +132,50 @@ impl Contribution {
     pub fn concerns(&self, approach: Approach) -> bool {
         self.approach.is_none_or(|it| it == approach)
     }
+
+    /// Whether its numbers can be those of an uncertainty.
+    fn check(&self) -> Result<(), BudgetError> {
+        let freedom = self.degrees_of_freedom.unwrap_or(1.0);
+        let judged = [
+            (
+                "the standard uncertainty",
+                self.value,
+                self.value >= 0.0 && self.value.is_finite(),
+            ),
+            (
+                "the sensitivity",
+                self.sensitivity,
+                self.sensitivity.is_finite(),
+            ),
+            (
+                "the number of degrees of freedom",
+                freedom,
+                freedom > 0.0 && freedom.is_finite(),
+            ),
+        ];
+        let wrong = judged.into_iter().find(|(_, _, is_sound)| !is_sound);
+        wrong.map_or(Ok(()), |(what, seen, _)| {
+            Err(BudgetError::Value {
+                name: self.name.clone(),
+                what,
+                seen,
+            })
+        })
+    }
 }
 
 /// What contributions come to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Combined {
+pub struct Combined<Q = Metres> {
     /// The combined standard uncertainty.
-    pub standard_uncertainty: Metres,
+    pub standard_uncertainty: Q,
     /// Its effective degrees of freedom; `None` for infinitely many.
     pub degrees_of_freedom: Option<f64>,
 }
 
-impl Combined {
+impl<Q: Quantity> Combined<Q> {
     /// The expanded uncertainty, with [`COVERAGE_FACTOR`].
-    pub fn expanded(&self) -> Metres {
+    pub fn expanded(&self) -> Q {
         self.standard_uncertainty * COVERAGE_FACTOR
     }
 }
@@ -125,7 +195,9 @@ impl Combined {
 /// assert!((combined.standard_uncertainty.nm() - 31.7).abs() < 0.1);
 /// assert!((combined.degrees_of_freedom.expect("of few readings") - 16.7).abs() < 0.1);
 /// ```
-pub fn combine_shares(shares: impl IntoIterator<Item = (Metres, Option<f64>)>) -> Combined {
+pub fn combine_shares<Q: Quantity>(
+    shares: impl IntoIterator<Item = (Q, Option<f64>)>,
+) -> Combined<Q> {
     let shares: Vec<(f64, Option<f64>)> = shares
         .into_iter()
         .map(|(u, freedom)| (u.value(), freedom))
@@ -139,7 +211,7 @@ pub fn combine_shares(shares: impl IntoIterator<Item = (Metres, Option<f64>)>) -
         .filter_map(|(u, freedom)| Some(relative(*u) * relative(*u) / (*freedom)?))
         .sum();
     Combined {
-        standard_uncertainty: Metres(combined),
+        standard_uncertainty: Q::from_value(combined),
         degrees_of_freedom: (combined > 0.0 && sum > 0.0).then(|| 1.0 / sum),
     }
 }

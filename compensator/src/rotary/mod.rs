@@ -40,6 +40,7 @@
 //! | `misplaced` | a plate turned otherwise than was entered |
 //! | `solver` | one evaluation after the other, until no outlier is left |
 //! | `solution`, `solve` | all of it, with uncertainties |
+//! | `budget` | what these are made of |
 //! | `line_signal` | where lines are in the sampled signal of a detector |
 //! | `sighted` | readings of one placement that a person made |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
@@ -50,6 +51,7 @@
 //!
 //! Absent: turning the plate, storage.
 
+mod budget;
 mod closed_form;
 mod design;
 mod lanes;

@@ -180,6 +180,14 @@ impl PeriodicTable {
     pub fn uncertainties(&self) -> Option<&[Radians]> {
         self.uncertainties.as_deref()
     }
+
+    /// The larger second difference of a line and the next one: what bends between them.
+    pub(super) fn bend(&self, line: usize) -> f64 {
+        let lines = self.deviations.len();
+        let at = |line: usize| self.deviations[line % lines].value();
+        let own = |line: usize| (at(line + lines - 1) - 2.0 * at(line) + at(line + 1)).abs();
+        own(line).max(own(line + 1))
+    }
 }
 
 /// A table made ready to be applied: no allocation and a constant time per call.
@@ -294,19 +302,9 @@ impl PeriodicCompensation {
         let own = square(line) * (1.0 - part) + square(line + 1) * part;
         let bent = match self.interpolation {
             PeriodicInterpolation::BandLimited => 0.0,
-            PeriodicInterpolation::Linear => {
-                let bend = self.bend(line).max(self.bend(line + 1));
-                part * (1.0 - part) / 2.0 * bend
-            }
+            PeriodicInterpolation::Linear => part * (1.0 - part) / 2.0 * self.table.bend(line),
         };
         Ok(Some(Radians((own + bent * bent).sqrt())))
-    }
-
-    /// |E[n − 1] − 2E[n] + E[n + 1]|.
-    fn bend(&self, line: usize) -> f64 {
-        let lines = self.table.deviations.len();
-        let at = |line: usize| self.table.deviations[line % lines].value();
-        (at(line + lines - 1) - 2.0 * at(line) + at(line + 1)).abs()
     }
 
     /// The table this was made from.

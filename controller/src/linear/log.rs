@@ -7,8 +7,8 @@ use machine::records::sound::{
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
 
-use crate::linear::sound::FREEDOM;
 use crate::linear::{JobEntry, PointEntry, ReachedEntry, RotationEntry, WentOnEntry, ZeroEntry};
+use crate::store::budget::FREEDOM;
 
 /// A line of such a journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

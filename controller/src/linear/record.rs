@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use units::{Approach, Metres};
 
 use crate::store::StoreError;
-pub(crate) use budget::{BudgetRecord, CombinedRecord};
 #[cfg(feature = "program")]
-pub(crate) use budget::{ContributionRecord, CorrelationRecord, PlaceRecord};
+pub(crate) use budget::PlaceRecord;
+pub(crate) use budget::{BudgetRecord, CombinedRecord};
 
 /// An error table as it is stored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

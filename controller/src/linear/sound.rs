@@ -1,22 +1,14 @@
 //! Whether a calibration of a linear axis can be so.
 
-use compensator::budget::COVERAGE_FACTOR;
 use machine::records::Content;
 use machine::records::sound::{
-    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, Limits, PLACE_M, RATIO, approach, as_many, counted,
-    increasing, is, letter, limits, model, number, optional,
+    COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PLACE_M, as_many, counted, increasing, is, model,
+    number, optional,
 };
 
 use crate::linear::LinearContent;
 use crate::linear::record::{BudgetRecord, CombinedRecord};
-
-/// What one unit of an input does.
-const SENSITIVITY: Limits = limits(-1e12, 1e12, "m or m/m per unit");
-/// How well an uncertainty is known.
-pub(super) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
-
-/// A figure that follows from others may differ by rounding.
-const ROUNDING: f64 = 1e-9;
+use crate::store::budget::{ROUNDING, judge_lines, same, same_freedom};
 
 impl Content for LinearContent {
     const KIND: &'static str = Self::KIND;
@@ -66,38 +58,9 @@ fn linear(it: &LinearContent) -> Judged {
     })
 }
 
-/// Contributions of a budget at most.
-const CONTRIBUTIONS_MAX: usize = 1000;
-/// Letters of a name at most.
-const NAME_MAX: usize = 200;
-
 /// A budget whose sums are not those of its lines says nothing.
 fn judge_budget(it: &LinearContent, stated: &BudgetRecord) -> Judged {
-    let lines = &stated.contributions;
-    counted("budget.contributions", lines.len(), 1..=CONTRIBUTIONS_MAX)?;
-    for (at, line) in lines.iter().enumerate() {
-        let place = |key: &str| format!("budget.contributions[{at}].{key}");
-        counted(&place("name"), line.name.len(), 1..=NAME_MAX)?;
-        counted(&place("unit"), line.unit.len(), 1..=NAME_MAX)?;
-        letter(&place("evaluation"), line.evaluation, &['A', 'B'])?;
-        line.approach
-            .map_or(Ok(()), |it| approach(&place("approach"), it))?;
-        number(place("value"), line.value, &RATIO)?;
-        number(place("sensitivity"), line.sensitivity, &SENSITIVITY)?;
-        optional(
-            &place("degrees_of_freedom"),
-            line.degrees_of_freedom,
-            &FREEDOM,
-        )?;
-    }
-    let factor = stated.coverage_factor;
-    let is_two = factor == COVERAGE_FACTOR;
-    is(
-        "budget.coverage_factor",
-        is_two,
-        || COVERAGE_FACTOR.to_string(),
-        || factor.to_string(),
-    )?;
+    judge_lines(&stated.contributions, stated.coverage_factor)?;
     let budget = it.axis_budget("");
     let follows = budget.as_ref().ok().and_then(Option::as_ref);
     let follows = follows.map(|budget| BudgetRecord::new(budget, &it.approaches()));
@@ -157,18 +120,6 @@ fn same_combined(
         seen.expanded_u_m,
         expected.expanded_u_m,
     )?;
-    let infinite = |it: Option<f64>| it.unwrap_or(f64::MAX);
-    same(
-        &at("degrees_of_freedom"),
-        infinite(seen.degrees_of_freedom),
-        infinite(expected.degrees_of_freedom),
-    )
-}
-
-/// What follows from the contributions, but for rounding.
-fn same(place: &str, seen: f64, expected: f64) -> Judged {
-    // A comparison with NaN is false.
-    let agrees = (seen - expected).abs() <= ROUNDING * expected.abs();
-    let follows = || format!("{expected:e}, which follows from the budget's contributions");
-    is(place, agrees, follows, || format!("{seen:e}"))
+    let freedom = (seen.degrees_of_freedom, expected.degrees_of_freedom);
+    same_freedom(&at("degrees_of_freedom"), freedom)
 }

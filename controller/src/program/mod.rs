@@ -5,6 +5,7 @@ mod answering;
 mod ask;
 mod before;
 mod belongs;
+mod budget;
 mod cal;
 mod check;
 mod controls;

@@ -126,6 +126,54 @@ fn stored(json: f64, record: f64, per_si: f64) {
     );
 }
 
+/// A budget that is kept place by place: its largest uncertainty, its shares and what they come to; `expanded` is what
+/// JSON calls U, with its unit. `lines` have the whole, in `share` units; `told` one line of it.
+#[track_caller]
+fn check_budget(
+    json: &Value,
+    record: &Value,
+    (expanded, per_si): (&str, f64),
+    (lines, told): (&str, &[&str]),
+) {
+    let places = list(record, "/budget/places");
+    let most = places.iter().map(|it| at(it, "/expanded_u_si"));
+    let most = most.fold(0.0, f64::max);
+    let worst = places.iter().find(|it| at(it, "/expanded_u_si") == most);
+    let worst = worst.unwrap();
+    let seen = at(json, &format!("/largest/{expanded}"));
+    stored(seen, most, per_si);
+    let up_to = "uncertainty U (k = 2) up to ";
+    for text in told {
+        check("U", seen, behind(text, up_to, 1)[0]);
+    }
+    // Lengths are nanometres in the table.
+    let per_share = if per_si == UM { 1e9 } else { per_si };
+    let whole = "U (k = 2) ";
+    check(
+        "U in the table",
+        most * per_share,
+        behind(lines, whole, 1)[0],
+    );
+    let u = behind(lines, "combined u ", 1)[0];
+    check("u in the table", at(worst, "/u_si") * per_share, u);
+    assert_eq!(json["contributions"], record["budget"]["contributions"]);
+    let contributions = list(record, "/budget/contributions").iter().enumerate();
+    for (number, it) in contributions {
+        let share = at(it, "/value") * at(worst, &format!("/sensitivities/{number}"));
+        let name = it["name"].as_str().unwrap();
+        // In the list: type, value, unit, share.
+        let row = &lines[lines.find(&format!("\n  {name}")).unwrap()..];
+        let row = row.trim_start().split('\n').next().unwrap();
+        let figures = behind(row, name, 2);
+        check(name, share * per_share, figures[1]);
+        let page = told.last().unwrap();
+        let on_page = &page[page
+            .find(&format!("{name} {} ", it["evaluation"].as_str().unwrap()))
+            .unwrap()..];
+        check(name, share * per_share, behind(on_page, name, 2)[1]);
+    }
+}
+
 const UM: f64 = 1e6;
 const ARCSEC: f64 = 180.0 * 3600.0 / core::f64::consts::PI;
 
@@ -475,6 +523,12 @@ fn check_rotary_calibration(desk: &Desk, calibrated: &RotaryCalibrated) {
     everywhere(
         residual,
         &[(&page, "residuals "), (&lines, "residual rms ")],
+    );
+    check_budget(
+        &json["uncertainty"],
+        content,
+        ("expanded_arcsec", ARCSEC),
+        (&lines, &[&text, &page]),
     );
     for (key, label) in [
         ("degrees_of_freedom", "rms with "),

@@ -13,6 +13,7 @@ use crate::rotary::operator::Operator;
 use crate::rotary::placed::{Placed, largest_closure};
 use crate::rotary::plate_journal::PlateJournal;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
+use crate::rotary::settings::interpolation_of;
 use crate::rotary::subject::{Subject, plate_record};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{PlateEntry, RotaryContent};
@@ -195,12 +196,17 @@ impl<'a> Calibration<'a> {
     ) -> Result<(RotaryCalibrated, TableInUse), Failure> {
         let placed = &self.placed;
         let lay_at = |it: &Placed| it.stood.is_none().then(|| it.phase.value());
-        let content = RotaryContent {
-            plate_phase_rad: placed.first().and_then(lay_at),
-            ..RotaryContent::new(&solution)
-        };
-        let stored = self.store_table(store, content.clone());
-        let (id, in_use) = stored.inspect_err(|it| self.journal.note(it))?;
+        let drawn = interpolation_of(self.subject.config.compensation.as_ref());
+        let content = RotaryContent::new(&solution).with_budget(&solution, drawn);
+        let axis = self.subject.axis.to_owned();
+        let content = content.map_err(|source| Failure::Budget { axis, source });
+        let lies_at = placed.first().and_then(lay_at);
+        let content = content.map(|it| RotaryContent {
+            plate_phase_rad: lies_at,
+            ..it
+        });
+        let stored = content.and_then(|it| Ok((self.store_table(store, it.clone())?, it)));
+        let ((id, in_use), content) = stored.inspect_err(|it| self.journal.note(it))?;
         self.journal.complete()?;
         let calibrated = RotaryCalibrated {
             path: store.calibration_path(&id),

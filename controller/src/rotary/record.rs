@@ -1,9 +1,12 @@
 //! The errors of a rotary table at the lines of a plate (`rotary_error_table`).
 
-use compensator::rotary::{PeriodicTable, Reading, Solution, harmonic_max};
+use compensator::budget::{BudgetError, PlacesBudget};
+use compensator::rotary::{PeriodicInterpolation, PeriodicTable, Reading, Solution, harmonic_max};
+use core::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 use units::Radians;
 
+use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{StoreError, short};
 
 /// One reading of the run: a line of the plate in one placement.
@@ -46,6 +49,10 @@ pub struct RotaryContent {
     pub missing: Vec<ReadingName>,
     /// Readings that were left out because they belong to no model.
     pub outliers: Vec<ReadingName>,
+    /// What the uncertainties are made of, at each line and half-way to the next; `None` where they are unknown,
+    /// and in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<PlacesBudgetRecord>,
 }
 
 impl RotaryContent {
@@ -77,7 +84,29 @@ impl RotaryContent {
             noise_amplification: solution.noise_amplification(),
             missing: solution.missing.iter().map(ReadingName::of).collect(),
             outliers: outliers.map(ReadingName::of).collect(),
+            budget: None,
         }
+    }
+
+    /// The same with what its uncertainties are made of, of a table drawn by `interpolation` between its lines.
+    ///
+    /// # Errors
+    /// When a figure is no uncertainty.
+    pub fn with_budget(
+        mut self,
+        solution: &Solution,
+        interpolation: PeriodicInterpolation,
+    ) -> Result<Self, BudgetError> {
+        let budget = solution.budget(interpolation)?;
+        self.budget = budget.map(|it| self.placed(&it));
+        Ok(self)
+    }
+
+    fn placed(&self, budget: &PlacesBudget<Radians>) -> PlacesBudgetRecord {
+        let half_lines = 2 * self.lines;
+        let angle = |at: u32| TAU * f64::from(at) / f64::from(half_lines);
+        let places = (0..half_lines).map(|at| (vec![angle(at)], None));
+        PlacesBudgetRecord::new(budget, places.collect())
     }
 
     /// The largest table error at the lines: the one figure that lists, screens and pages show. What

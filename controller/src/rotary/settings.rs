@@ -106,6 +106,14 @@ pub(crate) fn index_limit(rotary: &RotaryConfig) -> Option<Duration> {
     Some(Duration::from_secs_f64(10.0 + 2.0 * 360.0 / speed))
 }
 
+/// How a table is drawn between its lines; band-limited where nothing is said of it.
+pub(crate) fn interpolation_of(config: Option<&RotaryCompensationConfig>) -> PeriodicInterpolation {
+    match config.map(|it| it.interpolation) {
+        Some(PeriodicInterpolationName::Linear) => PeriodicInterpolation::Linear,
+        Some(PeriodicInterpolationName::BandLimited) | None => PeriodicInterpolation::BandLimited,
+    }
+}
+
 /// The compensation of a rotary axis from its table, within the limits of the configuration.
 ///
 /// # Errors
@@ -115,10 +123,7 @@ pub(crate) fn periodic_compensation(
     axis: &str,
     table: PeriodicTable,
 ) -> Result<PeriodicCompensation, Failure> {
-    let interpolation = match config.interpolation {
-        PeriodicInterpolationName::BandLimited => PeriodicInterpolation::BandLimited,
-        PeriodicInterpolationName::Linear => PeriodicInterpolation::Linear,
-    };
+    let interpolation = interpolation_of(Some(config));
     let limits = PeriodicLimits {
         size: Radians::from_arcsec(config.size_limit_arcsec),
         slope: config.slope_limit,

@@ -62,5 +62,17 @@ fn rotary(it: &RotaryContent) -> Judged {
             is(format_args!("{what}[{at}]"), known, expected, seen)?;
         }
     }
-    model("table_error_rad", it.table(""))
+    model("table_error_rad", it.table(""))?;
+    let Some(budget) = &it.budget else {
+        return Ok(());
+    };
+    as_many(
+        "budget.places",
+        budget.places.len(),
+        2 * lines,
+        "the lines, and the places between them",
+    )?;
+    let stated = it.standard_uncertainty_rad.iter().flatten();
+    let stated: Vec<_> = stated.enumerate().map(|(line, u)| (2 * line, *u)).collect();
+    budget.judge(&stated)
 }

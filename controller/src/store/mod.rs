@@ -1,5 +1,6 @@
 //! What is kept: [`machine::records`], and where the records of a machine lie.
 
+pub(crate) mod budget;
 #[cfg(test)]
 pub(crate) mod golden;
 #[cfg(test)]

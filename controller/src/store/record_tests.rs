@@ -65,6 +65,7 @@ fn rotary() -> CalibrationRecord<RotaryContent> {
         residual_rms_rad: 0.1,
         degrees_of_freedom: 0,
         noise_amplification: 0.7,
+        budget: None,
         missing: vec![ReadingName { offset: 1, line: 2 }],
         outliers: vec![],
     };

@@ -1,10 +1,10 @@
 //! The uncertainty budget of a linear calibration, as it is stored.
 
-use compensator::budget::{
-    AxisBudget, BudgetError, COVERAGE_FACTOR, Combined, Contribution, Correlation, Evaluation,
-};
+use compensator::budget::{AxisBudget, BudgetError, COVERAGE_FACTOR, Combined};
 use serde::{Deserialize, Serialize};
 use units::{Approach, Metres};
+
+use crate::store::budget::ContributionRecord;
 
 /// What makes the deviations uncertain, and what that comes to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -16,43 +16,6 @@ pub struct BudgetRecord {
     pub contributions: Vec<ContributionRecord>,
     /// What they come to at each calibrated position and half-way between two.
     pub places: Vec<PlaceRecord>,
-}
-
-/// One line of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContributionRecord {
-    /// Where it comes from.
-    pub name: String,
-    /// `A` or `B` (GUM 4.2 and 4.3).
-    pub evaluation: char,
-    /// Standard uncertainty of the input.
-    pub value: f64,
-    /// Its unit.
-    pub unit: String,
-    /// Metres per unit, or with `common_scale` metres per unit and metre of distance from the datum.
-    pub sensitivity: f64,
-    /// `null` for infinitely many.
-    pub degrees_of_freedom: Option<f64>,
-    /// What it does at two places.
-    pub correlation: CorrelationRecord,
-    /// `+` or `-` where it concerns one approach.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub approach: Option<char>,
-}
-
-/// What one input does at two places of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CorrelationRecord {
-    /// The same share of the distance from the datum.
-    CommonScale,
-    /// The same length.
-    CommonOffset,
-    /// Nothing in common.
-    Independent,
-    /// Nothing at the calibrated positions, most half-way between two.
-    BetweenPositions,
 }
 
 /// What a budget comes to at one place.
@@ -122,67 +85,6 @@ impl From<&Combined> for CombinedRecord {
             u_m: it.standard_uncertainty.value(),
             expanded_u_m: it.expanded().value(),
             degrees_of_freedom: it.degrees_of_freedom,
-        }
-    }
-}
-
-impl From<&Contribution> for ContributionRecord {
-    fn from(it: &Contribution) -> Self {
-        Self {
-            name: it.name.clone(),
-            evaluation: match it.evaluation {
-                Evaluation::A => 'A',
-                Evaluation::B => 'B',
-            },
-            value: it.value,
-            unit: it.unit.clone(),
-            sensitivity: it.sensitivity,
-            degrees_of_freedom: it.degrees_of_freedom,
-            correlation: it.correlation.into(),
-            approach: it.approach.map(Approach::symbol),
-        }
-    }
-}
-
-impl From<&ContributionRecord> for Contribution {
-    fn from(it: &ContributionRecord) -> Self {
-        Self {
-            name: it.name.clone(),
-            evaluation: match it.evaluation {
-                'A' => Evaluation::A,
-                _ => Evaluation::B,
-            },
-            value: it.value,
-            unit: it.unit.clone(),
-            sensitivity: it.sensitivity,
-            degrees_of_freedom: it.degrees_of_freedom,
-            correlation: it.correlation.into(),
-            approach: it.approach.map(|it| match it {
-                '-' => Approach::Reverse,
-                _ => Approach::Forward,
-            }),
-        }
-    }
-}
-
-impl From<Correlation> for CorrelationRecord {
-    fn from(it: Correlation) -> Self {
-        match it {
-            Correlation::CommonScale => Self::CommonScale,
-            Correlation::CommonOffset => Self::CommonOffset,
-            Correlation::Independent => Self::Independent,
-            Correlation::BetweenPositions => Self::BetweenPositions,
-        }
-    }
-}
-
-impl From<CorrelationRecord> for Correlation {
-    fn from(it: CorrelationRecord) -> Self {
-        match it {
-            CorrelationRecord::CommonScale => Self::CommonScale,
-            CorrelationRecord::CommonOffset => Self::CommonOffset,
-            CorrelationRecord::Independent => Self::Independent,
-            CorrelationRecord::BetweenPositions => Self::BetweenPositions,
         }
     }
 }

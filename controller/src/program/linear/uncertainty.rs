@@ -6,14 +6,13 @@ use compensator::budget::{COVERAGE_FACTOR, Combined};
 use serde_json::{Value, json};
 use units::{Approach, Metres, Short};
 
-use crate::linear::record::{BudgetRecord, CombinedRecord, ContributionRecord};
+use crate::linear::record::{BudgetRecord, CombinedRecord};
 use crate::linear::{LinearContent, UncertaintyAtTarget};
+use crate::program::budget::{AtWorst, LENGTHS};
 
 /// Of a calibration that has no budget.
 pub(crate) const NOT_STATED: &str = "u: scatter and instrument alone; the calibration has no uncertainty budget \
                                      (made before there was one, or measured elsewhere)";
-/// Contributions that are named in one line.
-const NAMED: usize = 4;
 
 /// The largest uncertainty of a calibration: where, from which side, and how large.
 #[derive(Clone, Copy, Debug)]
@@ -42,82 +41,32 @@ pub(crate) fn largest(budget: &BudgetRecord) -> Option<Largest> {
     known.max_by(|a, b| a.combined.u_m.total_cmp(&b.combined.u_m))
 }
 
-/// What each contribution comes to there, the largest first.
-pub(crate) fn shares(content: &LinearContent, at: &Largest) -> Vec<(ContributionRecord, Metres)> {
-    let budget = content.axis_budget("").ok().flatten();
-    let shares = budget.and_then(|it| {
-        let shares = it.shares(at.position, at.approach)?.into_iter();
-        Some(shares.map(|(line, share)| (line.into(), share)).collect())
-    });
-    let mut shares: Vec<(ContributionRecord, Metres)> = shares.unwrap_or_default();
-    shares.sort_by(|a, b| b.1.value().total_cmp(&a.1.value()));
-    shares
+/// The budget there.
+pub(crate) fn worst(content: &LinearContent) -> Option<AtWorst> {
+    let at = content.budget.as_ref().and_then(largest)?;
+    let budget = content.axis_budget("").ok().flatten()?;
+    let shares = budget.shares(at.position, at.approach)?.into_iter();
+    let worst = AtWorst {
+        place: format!("{} mm", Short(at.position.mm())),
+        approach: Some(at.approach),
+        shares: shares
+            .map(|(it, share)| (it.into(), share.value()))
+            .collect(),
+        u_si: at.combined.u_m,
+        degrees_of_freedom: at.combined.degrees_of_freedom,
+        told: LENGTHS,
+    };
+    Some(worst.sorted())
 }
 
 /// In one line: the largest uncertainty, and what makes it.
 pub(crate) fn sentence(content: &LinearContent) -> String {
-    let Some(at) = content.budget.as_ref().and_then(largest) else {
-        return NOT_STATED.to_owned();
-    };
-    let named = shares(content, &at)
-        .into_iter()
-        .take(NAMED)
-        .map(|(it, share)| format!("{} {:.0} nm", it.name, share.nm()));
-    format!(
-        "uncertainty U (k = {}) up to {:.3} µm, at {} mm; largest contributions there: {}",
-        Short(COVERAGE_FACTOR),
-        Metres(at.combined.expanded_u_m).um(),
-        Short(at.position.mm()),
-        named.collect::<Vec<_>>().join(", ")
-    )
+    worst(content).map_or_else(|| NOT_STATED.to_owned(), |it| it.sentence())
 }
 
 /// The whole budget, after a table.
 pub(crate) fn lines(content: &LinearContent) -> String {
-    let Some(at) = content.budget.as_ref().and_then(largest) else {
-        return format!("\n{NOT_STATED}");
-    };
-    let combined = at.combined;
-    let at_mm = format!("{} mm, {}", Short(at.position.mm()), at.approach.symbol());
-    let head = format!(
-        "\nuncertainty budget (GUM), shares at {at_mm}\n  {:<38} {:>4} {:>12} {:<9} {:>10} {:>9}  {}",
-        "contribution", "type", "u of input", "", "share (nm)", "freedom", "at two places"
-    );
-    let each = shares(content, &at).into_iter().map(|(it, share)| {
-        let freedom = it
-            .degrees_of_freedom
-            .map_or("∞".into(), |it| format!("{it:.1}"));
-        format!(
-            "\n  {:<38} {:>4} {:>12} {:<9} {:>10.1} {freedom:>9}  {}",
-            it.name,
-            it.evaluation,
-            Short(it.value).to_string(),
-            it.unit,
-            share.nm(),
-            correlation(&it)
-        )
-    });
-    let foot = format!(
-        "\n  combined u {:.1} nm, U (k = {}) {:.1} nm, effective degrees of freedom {}",
-        Metres(combined.u_m).nm(),
-        Short(COVERAGE_FACTOR),
-        Metres(combined.expanded_u_m).nm(),
-        combined
-            .degrees_of_freedom
-            .map_or("∞".into(), |it| format!("{it:.0}"))
-    );
-    head + &each.collect::<String>() + &foot
-}
-
-/// What a contribution does at two places, in words.
-pub(crate) fn correlation(it: &ContributionRecord) -> &'static str {
-    use crate::linear::record::CorrelationRecord as C;
-    match it.correlation {
-        C::CommonScale => "common scale",
-        C::CommonOffset => "common offset",
-        C::Independent => "independent",
-        C::BetweenPositions => "between positions",
-    }
+    worst(content).map_or_else(|| format!("\n{NOT_STATED}"), |it| it.lines())
 }
 
 /// For programs: the budget as it is stored, with its largest uncertainty.

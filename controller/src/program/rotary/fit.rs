@@ -13,13 +13,15 @@ use machine::records::{CalibrationRecord, short};
 use serde_json::json;
 use units::Radians;
 
+use crate::program::budget;
 use crate::program::data_file::rotary_head_of;
 use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
-use crate::program::rotary::json as to_json;
+use crate::program::rotary::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
 use crate::rotary::RotaryContent;
 use crate::rotary::RotaryFailure;
+use crate::rotary::settings::interpolation_of;
 use crate::{Failure, config};
 
 /// Harmonics that a plan prints; `--json` has them all.
@@ -259,7 +261,12 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
     if let Some(plate) = &args.plate {
         head.instrument.identity = core::mem::replace(&mut head.instrument.name, plate.clone());
     }
-    let content = RotaryContent::new(solution);
+    let drawn = interpolation_of(axes[&axis].compensation.as_ref());
+    let content = RotaryContent::new(solution).with_budget(solution, drawn);
+    let content = content.map_err(|source| Failure::Budget {
+        axis: axis.clone(),
+        source,
+    })?;
     if let Some(limits) = &axes[&axis].compensation {
         crate::rotary::settings::periodic_compensation(limits, &axis, content.table("just made")?)?;
     }
@@ -298,7 +305,7 @@ fn shown(content: &RotaryContent) -> String {
             cell(content.plate_error_rad.get(line).copied().flatten()),
         );
     }
-    text
+    text + &budget::lines(uncertainty::worst(content))
 }
 
 /// Two stored tables, for `cal diff`.

@@ -12,6 +12,7 @@ mod residuals;
 mod stored_tests;
 mod targets;
 pub(crate) mod told;
+mod uncertainty;
 pub(crate) mod verbs;
 
 use std::path::Path;

@@ -6,10 +6,12 @@ use core::fmt::Write as _;
 use machine::records::{CalibrationRecord, ReadJournal};
 use units::Radians;
 
+use crate::program::budget;
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts, facts_of};
 use crate::program::rotary::residuals::residuals_of;
+use crate::program::rotary::uncertainty;
 use crate::rotary::PlateLog;
 use crate::rotary::placed::largest_closure;
 use crate::rotary::verify::RotaryFigures;
@@ -206,6 +208,10 @@ fn calibration(content: &RotaryContent) -> String {
             &plate,
             None,
         ),
+    );
+    html += &format!(
+        "<h3>Uncertainty</h3>{}",
+        budget::html(uncertainty::worst(content))
     );
     html += &named(
         "Missing readings",

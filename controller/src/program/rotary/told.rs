@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use crate::program::output::{Ended, Output};
 use crate::program::rotary::json::{arcsec, solution};
+use crate::program::rotary::uncertainty;
 use crate::program::text::verdict;
 use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryMoved, RotaryTeller, RotaryVerified};
@@ -99,6 +100,9 @@ pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
              predict"
         );
     }
+    if let Some(worst) = uncertainty::worst(content) {
+        text += &format!("\n  {}", worst.sentence());
+    }
     if !solution.missing.is_empty() {
         text += &format!("\n  {} readings are missing", solution.missing.len());
     }
@@ -112,6 +116,7 @@ pub(crate) fn calibrated_value(calibrated: &RotaryCalibrated) -> Value {
     value["journal"] = json!(calibrated.journal);
     value["closure_arcsec"] = json!(arcsec(calibrated.closure));
     value["pass_scatter_arcsec"] = json!(calibrated.scatter.map(arcsec));
+    value["uncertainty"] = uncertainty::value(&calibrated.content);
     value["largest_deviation_arcsec"] = json!(arcsec(calibrated.content.largest_error()));
     value
 }

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use units::{Metres, Short};
+use units::Metres;
 
 use crate::linear::LinearContent;
 use crate::linear::record::{BudgetRecord, CombinedRecord, PlaceRecord};
@@ -22,7 +22,7 @@ pub(super) fn html(content: &LinearContent) -> String {
     if varies(budget) {
         html += &format!("<figure>{}</figure>", curve(budget));
     }
-    html + &table(content)
+    html + &uncertainty::worst(content).map_or_else(String::new, |it| it.table())
 }
 
 fn expanded(budget: &BudgetRecord) -> impl Iterator<Item = f64> {
@@ -72,38 +72,6 @@ fn line(
     )
 }
 
-fn table(content: &LinearContent) -> String {
-    let Some(at) = content.budget.as_ref().and_then(uncertainty::largest) else {
-        return String::new();
-    };
-    let mut html = format!(
-        "<table><tr><th>contribution</th><th>type</th><th>u of input</th><th></th>\
-         <th>share at {} mm (nm)</th><th>degrees of freedom</th><th>at two places</th></tr>",
-        Short(at.position.mm())
-    );
-    let freedom = |it: Option<f64>| it.map_or("∞".to_owned(), |it| format!("{it:.1}"));
-    for (it, share) in uncertainty::shares(content, &at) {
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td></tr>",
-            escape(&it.name),
-            escape(&it.evaluation.to_string()),
-            Short(it.value),
-            escape(&it.unit),
-            share.nm(),
-            freedom(it.degrees_of_freedom),
-            uncertainty::correlation(&it)
-        );
-    }
-    let _ = write!(
-        html,
-        "<tr><td>combined u</td><td></td><td></td><td></td><td>{:.1}</td><td>{}</td><td></td></tr>",
-        Metres(at.combined.u_m).nm(),
-        freedom(at.combined.degrees_of_freedom)
-    );
-    html + "</table>"
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,10 +95,9 @@ mod tests {
         }
         assert!(html.contains(&uncertainty::sentence(&content)));
         // What is listed is all: the shares come to the whole.
-        let at = uncertainty::largest(content.budget.as_ref().unwrap()).unwrap();
-        let shares = uncertainty::shares(&content, &at).into_iter();
-        let sum: f64 = shares.map(|(_, it)| it.value() * it.value()).sum();
-        assert!((sum.sqrt() / at.combined.u_m - 1.0).abs() < 1e-9);
+        let at = uncertainty::worst(&content).unwrap();
+        let sum: f64 = at.shares.iter().map(|(_, it)| it * it).sum();
+        assert!((sum.sqrt() / at.u_si - 1.0).abs() < 1e-9);
     }
 
     #[test]

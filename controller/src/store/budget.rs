@@ -1,0 +1,282 @@
+//! Uncertainty budgets as they are stored: what contributes, and at places of their own what that comes to.
+
+use compensator::budget::{COVERAGE_FACTOR, Contribution, Correlation, Evaluation, PlacesBudget};
+use machine::records::sound::{
+    Judged, Limits, RATIO, approach, as_many, counted, is, letter, limits, model, number, numbers,
+    optional,
+};
+use serde::{Deserialize, Serialize};
+use units::{Approach, Quantity};
+
+/// One line of a budget.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContributionRecord {
+    /// Where it comes from.
+    pub name: String,
+    /// `A` or `B` (GUM 4.2 and 4.3).
+    pub evaluation: char,
+    /// Standard uncertainty of the input.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// SI units of the result per unit, or with `common_scale` metres per unit and metre of distance from
+    /// the datum; where places have sensitivities of their own, that at the least certain of them.
+    pub sensitivity: f64,
+    /// `null` for infinitely many.
+    pub degrees_of_freedom: Option<f64>,
+    /// What it does at two places.
+    pub correlation: CorrelationRecord,
+    /// `+` or `-` where it concerns one approach.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approach: Option<char>,
+}
+
+/// What one input does at two places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrelationRecord {
+    /// The same share of the distance from the datum.
+    CommonScale,
+    /// The same length or angle.
+    CommonOffset,
+    /// Nothing in common.
+    Independent,
+    /// Nothing at the calibrated positions, most half-way between two.
+    BetweenPositions,
+    /// What the fit makes of readings that places share.
+    SharedReadings,
+}
+
+/// The budget of a calibration whose inputs act otherwise at each place.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlacesBudgetRecord {
+    /// k: each `expanded_u_si` is so many times its `u_si`.
+    pub coverage_factor: f64,
+    /// What contributes (GUM clause 8).
+    pub contributions: Vec<ContributionRecord>,
+    /// What they come to, place by place.
+    pub places: Vec<PlaceBudgetRecord>,
+}
+
+/// What contributions come to at one place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlaceBudgetRecord {
+    /// Where: an angle in radians, or one or three coordinates in metres.
+    pub at_si: Vec<f64>,
+    /// `+` or `-` where that matters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approach: Option<char>,
+    /// What a unit of each contribution does here, metres or radians.
+    pub sensitivities: Vec<f64>,
+    /// Combined standard uncertainty, metres or radians.
+    pub u_si: f64,
+    /// Expanded uncertainty, likewise.
+    pub expanded_u_si: f64,
+    /// Effective degrees of freedom (Welch and Satterthwaite); `null` for infinitely many.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+impl PlaceBudgetRecord {
+    /// From which side, where that matters.
+    pub(crate) fn side(&self) -> Option<Approach> {
+        self.approach.map(side)
+    }
+}
+
+/// The approach of this symbol.
+fn side(symbol: char) -> Approach {
+    match symbol {
+        '-' => Approach::Reverse,
+        _ => Approach::Forward,
+    }
+}
+
+/// Where a place is, and from which side where that matters.
+pub(crate) type At = (Vec<f64>, Option<Approach>);
+
+impl PlacesBudgetRecord {
+    /// What `budget` says of the places at `places`, in its order.
+    pub(crate) fn new<Q: Quantity>(budget: &PlacesBudget<Q>, places: Vec<At>) -> Self {
+        let sensitivities = budget.sensitivities().iter().enumerate();
+        let places = sensitivities.zip(places);
+        let places = places.map(|((number, sensitivities), (at_si, approach))| {
+            let combined = budget.at(number);
+            PlaceBudgetRecord {
+                at_si,
+                approach: approach.map(Approach::symbol),
+                sensitivities: sensitivities.clone(),
+                u_si: combined.standard_uncertainty.value(),
+                expanded_u_si: combined.expanded().value(),
+                degrees_of_freedom: combined.degrees_of_freedom,
+            }
+        });
+        Self {
+            coverage_factor: COVERAGE_FACTOR,
+            contributions: budget.contributions().iter().map(Into::into).collect(),
+            places: places.collect(),
+        }
+    }
+
+    /// The least certain place; `None` of a record without any.
+    pub(crate) fn least_certain(&self) -> Option<&PlaceBudgetRecord> {
+        let places = self.places.iter();
+        places.reduce(|most, it| if it.u_si > most.u_si { it } else { most })
+    }
+
+    /// Whether its sums are those of its lines, and are `stated` where somebody else states them.
+    pub(crate) fn judge(&self, stated: &[(usize, f64)]) -> Judged {
+        counted("budget.places", self.places.len(), 1..=PLACES_MAX)?;
+        judge_lines(&self.contributions, self.coverage_factor)?;
+        let lines = self.contributions.iter().map(Contribution::from).collect();
+        for (at, it) in self.places.iter().enumerate() {
+            let place = |key: &str| format!("budget.places[{at}].{key}");
+            counted(&place("at_si"), it.at_si.len(), 1..=3)?;
+            numbers(&place("at_si"), &it.at_si, &AT)?;
+            it.approach
+                .map_or(Ok(()), |it| approach(&place("approach"), it))?;
+            let key = place("sensitivities");
+            let wanted = self.contributions.len();
+            as_many(&key, it.sensitivities.len(), wanted, "the contributions")?;
+            numbers(&key, &it.sensitivities, &SENSITIVITY)?;
+        }
+        let sensitivities = self.places.iter().map(|it| it.sensitivities.clone());
+        let budget = PlacesBudget::<units::Metres>::new(lines, sensitivities.collect());
+        let Ok(budget) = &budget else {
+            return model("budget", budget);
+        };
+        for (at, it) in self.places.iter().enumerate() {
+            let place = |key: &str| format!("budget.places[{at}].{key}");
+            let follows = budget.at(at);
+            let u = follows.standard_uncertainty.value();
+            same(&place("u_si"), it.u_si, u)?;
+            same(
+                &place("expanded_u_si"),
+                it.expanded_u_si,
+                COVERAGE_FACTOR * u,
+            )?;
+            let freedom = (it.degrees_of_freedom, follows.degrees_of_freedom);
+            same_freedom(&place("degrees_of_freedom"), freedom)?;
+        }
+        for (at, u) in stated {
+            let seen = self.places.get(*at).map_or(f64::NAN, |it| it.u_si);
+            same(&format!("budget.places[{at}].u_si"), seen, *u)?;
+        }
+        Ok(())
+    }
+}
+
+/// Contributions of a budget at most.
+const CONTRIBUTIONS_MAX: usize = 1000;
+/// Places of one at most.
+const PLACES_MAX: usize = 2_000_000;
+/// Letters of a name at most.
+const NAME_MAX: usize = 200;
+/// What one unit of an input does.
+const SENSITIVITY: Limits = limits(-1e12, 1e12, "SI units per unit");
+/// Where a place is.
+const AT: Limits = limits(-1e3, 1e3, "m or rad");
+/// How well an uncertainty is known.
+pub(crate) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
+/// A figure that follows from others may differ by rounding.
+pub(crate) const ROUNDING: f64 = 1e-9;
+
+/// Whether the lines of a budget can be so, with its coverage factor.
+pub(crate) fn judge_lines(lines: &[ContributionRecord], factor: f64) -> Judged {
+    counted("budget.contributions", lines.len(), 1..=CONTRIBUTIONS_MAX)?;
+    for (at, line) in lines.iter().enumerate() {
+        let place = |key: &str| format!("budget.contributions[{at}].{key}");
+        counted(&place("name"), line.name.len(), 1..=NAME_MAX)?;
+        counted(&place("unit"), line.unit.len(), 1..=NAME_MAX)?;
+        letter(&place("evaluation"), line.evaluation, &['A', 'B'])?;
+        line.approach
+            .map_or(Ok(()), |it| approach(&place("approach"), it))?;
+        number(place("value"), line.value, &RATIO)?;
+        number(place("sensitivity"), line.sensitivity, &SENSITIVITY)?;
+        let freedom = line.degrees_of_freedom;
+        optional(&place("degrees_of_freedom"), freedom, &FREEDOM)?;
+    }
+    let is_two = factor == COVERAGE_FACTOR;
+    is(
+        "budget.coverage_factor",
+        is_two,
+        || COVERAGE_FACTOR.to_string(),
+        || factor.to_string(),
+    )
+}
+
+/// What follows from the contributions, but for rounding.
+pub(crate) fn same(place: &str, seen: f64, expected: f64) -> Judged {
+    // A comparison with NaN is false.
+    let agrees = (seen - expected).abs() <= ROUNDING * expected.abs();
+    let follows = || format!("{expected:e}, which follows from the budget's contributions");
+    is(place, agrees, follows, || format!("{seen:e}"))
+}
+
+/// Likewise of degrees of freedom.
+pub(crate) fn same_freedom(place: &str, (seen, expected): (Option<f64>, Option<f64>)) -> Judged {
+    let infinite = |it: Option<f64>| it.unwrap_or(f64::MAX);
+    same(place, infinite(seen), infinite(expected))
+}
+
+impl From<&Contribution> for ContributionRecord {
+    fn from(it: &Contribution) -> Self {
+        Self {
+            name: it.name.clone(),
+            evaluation: match it.evaluation {
+                Evaluation::A => 'A',
+                Evaluation::B => 'B',
+            },
+            value: it.value,
+            unit: it.unit.clone(),
+            sensitivity: it.sensitivity,
+            degrees_of_freedom: it.degrees_of_freedom,
+            correlation: it.correlation.into(),
+            approach: it.approach.map(Approach::symbol),
+        }
+    }
+}
+
+impl From<&ContributionRecord> for Contribution {
+    fn from(it: &ContributionRecord) -> Self {
+        Self {
+            name: it.name.clone(),
+            evaluation: match it.evaluation {
+                'A' => Evaluation::A,
+                _ => Evaluation::B,
+            },
+            value: it.value,
+            unit: it.unit.clone(),
+            sensitivity: it.sensitivity,
+            degrees_of_freedom: it.degrees_of_freedom,
+            correlation: it.correlation.into(),
+            approach: it.approach.map(side),
+        }
+    }
+}
+
+impl From<Correlation> for CorrelationRecord {
+    fn from(it: Correlation) -> Self {
+        match it {
+            Correlation::CommonScale => Self::CommonScale,
+            Correlation::CommonOffset => Self::CommonOffset,
+            Correlation::Independent => Self::Independent,
+            Correlation::BetweenPositions => Self::BetweenPositions,
+            Correlation::SharedReadings => Self::SharedReadings,
+        }
+    }
+}
+
+impl From<CorrelationRecord> for Correlation {
+    fn from(it: CorrelationRecord) -> Self {
+        match it {
+            CorrelationRecord::CommonScale => Self::CommonScale,
+            CorrelationRecord::CommonOffset => Self::CommonOffset,
+            CorrelationRecord::Independent => Self::Independent,
+            CorrelationRecord::BetweenPositions => Self::BetweenPositions,
+            CorrelationRecord::SharedReadings => Self::SharedReadings,
+        }
+    }
+}
