@@ -11,6 +11,7 @@ import sys
 
 import numpy
 from GTC import dof, multiple_ureal, uncertainty, ureal
+from scipy import stats
 
 
 def freedom_of(value):
@@ -55,9 +56,33 @@ def of_table(task):
     return [told(combined(row, readings)) for row in weights]
 
 
+def of_screw(task):
+    """Where a screw stops: its model by least squares over strokes that are all repeated alike.
+
+    What a stroke's mean and the difference of its sides scatter are independent; each is widened so that twice
+    it is exceeded as seldom as twice that of a normal distribution.
+    """
+    strokes, lines = task["strokes"], task["budget"]["contributions"]
+    inputs = []
+    count = len(strokes)
+    for line in lines[:2]:
+        freedom = line["degrees_of_freedom"]
+        u = line["value"] * stats.t.isf(0.0455 / 2, freedom) / 2 / math.sqrt(2 * task["repeated"])
+        inputs += multiple_ureal([0] * count, [u] * count, freedom)
+    # The mean of both sides, and half their difference.
+    design = [[1, s, 0.5] for s in strokes] + [[0, 0, 0.5] for _ in strokes]
+    weights = numpy.linalg.pinv(numpy.array(design))
+    stop = ureal(0, lines[2]["value"], lines[2]["degrees_of_freedom"])
+    places = []
+    for place in task["budget"]["places"]:
+        row = numpy.array([1, place["at_si"][0], place["approach"] == "-"])
+        places.append(told(combined(row @ weights, inputs) + stop))
+    return places
+
+
 def main():
     task = json.load(sys.stdin)
-    again = {"table": of_table}[task["of"]](task)
+    again = {"table": of_table, "screw": of_screw}[task["of"]](task)
     print(json.dumps({"record": of_record(task["budget"]), "again": again}), flush=True)
 
 

@@ -16,12 +16,13 @@
 
 use units::Metres;
 
+use super::budget::{SIDES, STROKES, ScatterPart, ScatterParts};
 use super::error::FitError;
 use super::observe::observable;
 use super::options::FitOptions;
 use super::outliers::{self, StrokeOutlier};
-use super::problem::{FLOOR, HarmonicTest, Problem};
-use super::strata::Variances;
+use super::problem::{FLOOR, HarmonicTest, Problem, SCATTER_FLOOR_M};
+use super::strata::{Strata, Variances};
 use super::{BASE, Harmonic, ScrewModel};
 use crate::least_squares::LeastSquaresError;
 use crate::screw::Stroke;
@@ -38,6 +39,8 @@ const LACK_OF_FIT_LEVEL: f64 = 0.01;
 pub struct Fitted {
     /// The model, with its covariance, which is unknown where no stroke is left to judge it by.
     pub model: ScrewModel,
+    /// What the model's uncertainty is made of, where it is known.
+    pub parts: Option<ScatterParts>,
     /// Rows that were left out, in the order given.
     pub outliers: Vec<StrokeOutlier>,
     /// Standard deviation of a single row about the model.
@@ -149,6 +152,7 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
     let covariance = strata
         .widened()
         .map(|real| problem.covariance(&kept, (&variances, &real), &solved.cofactor));
+    let parts = parts_of(&problem, &kept, &strata, &solved.cofactor);
     let root = |variance: f64| Metres(variance.sqrt());
     let residual = root(variances.of_one());
     let repeatability = root(variances.repeat);
@@ -166,6 +170,7 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
             covariance,
             residual,
         ),
+        parts,
         outliers: Vec::new(),
         residual,
         scatter: Scatter {
@@ -229,6 +234,36 @@ fn model_of(
         covariance,
         scatter: Some(scatter),
     }
+}
+
+/// The covariance by what it comes from; `None` where it is unknown.
+fn parts_of(
+    problem: &Problem,
+    kept: &[u32],
+    strata: &Strata,
+    cofactor: &[f64],
+) -> Option<ScatterParts> {
+    let (variances, real) = (strata.variances(), strata.widened()?);
+    let [strokes, sides] = problem.covariance_in_parts(kept, (&variances, &real), cofactor);
+    let part = |name, scatter: f64, degrees_of_freedom, covariance| ScatterPart {
+        name,
+        scatter: Metres(scatter.max(SCATTER_FLOOR_M)),
+        degrees_of_freedom,
+        covariance,
+    };
+    let (between, within) = (strata.strokes.freedom, strata.freedom_of_sides());
+    Some(ScatterParts {
+        of_model: vec![
+            part(STROKES, strata.scatter_of_strokes(), between, strokes),
+            part(SIDES, strata.scatter_of_sides(), within, sides),
+        ],
+        // What is largest of it is known that well.
+        freedom_of_stop: if variances.stroke > 0.0 {
+            between
+        } else {
+            within
+        },
+    })
 }
 
 fn leaks(

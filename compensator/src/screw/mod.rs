@@ -32,6 +32,7 @@
 //!
 //! Absent: temperature, wear, speed-dependent friction, random error (it is the `scatter`).
 
+mod budget;
 mod cells;
 mod compensation;
 mod engagement;
@@ -54,6 +55,7 @@ use units::{Approach, Metres};
 
 use crate::uncertainty::propagate;
 
+pub use budget::{ScatterPart, ScatterParts};
 pub use compensation::{Correction, OutOfRange, Rule, ScrewCompensation};
 pub use engagement::{Engagement, ScrewMemory};
 pub use error::FitError;

@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use units::portable::hypot;
 use units::{Approach, Metres};
 
+use super::budget::{SIDES, ScatterPart, ScatterParts};
+use super::problem::SCATTER_FLOOR_M;
 use super::{FitError, ScrewModel};
 use crate::screw::Stroke;
 use crate::uncertainty;
@@ -140,6 +142,20 @@ fn scatter(strokes: &[Stroke]) -> Option<(Metres, usize)> {
 }
 
 impl PatentEstimate {
+    /// What the uncertainties of [`Self::model`] are made of; `None` when nothing was repeated.
+    pub fn parts(&self) -> Option<ScatterParts> {
+        let u = self.uncertainty?;
+        Some(ScatterParts {
+            of_model: vec![ScatterPart {
+                name: SIDES,
+                scatter: Metres(u.scatter.value().max(SCATTER_FLOOR_M)),
+                degrees_of_freedom: u.degrees_of_freedom,
+                covariance: self.model().covariance?,
+            }],
+            freedom_of_stop: u.degrees_of_freedom,
+        })
+    }
+
     /// The model that these means stand for: no offset, `mean_all` as lost motion.
     pub fn model(&self) -> ScrewModel {
         let covariance = self.uncertainty.map(|u| {

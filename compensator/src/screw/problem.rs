@@ -101,12 +101,38 @@ impl Problem {
         (assumed, real): (&Variances, &Variances),
         cofactor: &[f64],
     ) -> Vec<f64> {
+        self.sandwich(harmonics, assumed, cofactor, |place| block(place, real))
+    }
+
+    /// The same in two parts: what the means of strokes scatter, and what the sides and repetitions of a stroke
+    /// differ by.
+    pub(super) fn covariance_in_parts(
+        &self,
+        harmonics: &[u32],
+        (assumed, real): (&Variances, &Variances),
+        cofactor: &[f64],
+    ) -> [Vec<f64>; 2] {
+        let means = |place: &Place| block_of_mean(place, real);
+        let within = |place: &Place| block(place, real) - block_of_mean(place, real);
+        [
+            self.sandwich(harmonics, assumed, cofactor, means),
+            self.sandwich(harmonics, assumed, cofactor, within),
+        ]
+    }
+
+    fn sandwich(
+        &self,
+        harmonics: &[u32],
+        assumed: &Variances,
+        cofactor: &[f64],
+        real: impl Fn(&Place) -> Matrix2<f64>,
+    ) -> Vec<f64> {
         let size = BASE + 2 * harmonics.len();
         let mut middle = vec![0.0; size * size];
         for place in &self.cells.places {
             let rows: Vec<_> = place.design(self.lead, harmonics).map(|it| it.1).collect();
             let inverse = inverse_block(place, assumed);
-            let kernel = inverse * block(place, real) * inverse;
+            let kernel = inverse * real(place) * inverse;
             for i in 0..size {
                 for j in 0..size {
                     let left = Vector2::from_fn(|at, _| rows.get(at).map_or(0.0, |it| it[i]));
@@ -208,6 +234,17 @@ fn block(place: &Place, variances: &Variances) -> Matrix2<f64> {
             Matrix2::new(variances.stroke + floored(count), 0.0, 0.0, 1.0)
         }
     }
+}
+
+/// What both sides of a stroke have in common: the variance of its best mean. Of one side alone all of it.
+fn block_of_mean(place: &Place, variances: &Variances) -> Matrix2<f64> {
+    let block = block(place, variances);
+    if place.cells.len() < 2 {
+        return block;
+    }
+    let shared = block[(1, 0)];
+    let weights = [0, 1].map(|i| 1.0 / (block[(i, i)] - shared));
+    Matrix2::repeat(shared + 1.0 / (weights[0] + weights[1]))
 }
 
 /// The inverse of [`block`], its determinant not as a difference of large numbers.

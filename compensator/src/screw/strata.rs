@@ -187,6 +187,16 @@ impl Strata {
         self.sides.unwrap_or(self.within).freedom
     }
 
+    /// The standard deviation of a row by what a difference at the same stroke is judged by.
+    pub(super) fn scatter_of_sides(&self) -> f64 {
+        self.sides.unwrap_or(self.within).mean().sqrt()
+    }
+
+    /// The same by what strokes are judged by.
+    pub(super) fn scatter_of_strokes(&self) -> f64 {
+        self.strokes.mean().sqrt()
+    }
+
     /// The probability that strokes without errors of their own scatter so much; `None` where no
     /// repetition or no stroke is left to judge by.
     pub(super) fn lack_of_fit(&self, floor: f64) -> Option<f64> {

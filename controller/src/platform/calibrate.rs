@@ -7,7 +7,8 @@ use compensator::platform::Pose;
 use compensator::platform::cause::Sighting;
 use compensator::screw::Stroke;
 use compensator::screw::{
-    self, FitOptions, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier, patent,
+    self, FitOptions, Limits, Rule, ScatterParts, ScrewCompensation, ScrewModel, StrokeOutlier,
+    patent,
 };
 use units::{Approach, Metres};
 
@@ -37,6 +38,15 @@ pub struct ScrewCalibrated {
     pub strokes: usize,
     /// Those of them that do not fit the others and were left out.
     pub outliers: Vec<StrokeOutlier>,
+    /// As it is stored.
+    pub content: ScrewContent,
+}
+
+/// What the strokes of a screw say.
+struct FittedScrew {
+    model: ScrewModel,
+    outliers: Vec<StrokeOutlier>,
+    parts: Option<ScatterParts>,
 }
 
 /// A platform that was calibrated.
@@ -194,10 +204,10 @@ impl AlignmentPlatform<'_> {
         at: usize,
         plan: &PlatformCalibrateConfig,
         strokes: &[Stroke],
-    ) -> Result<(ScrewModel, Vec<StrokeOutlier>), Failure> {
+    ) -> Result<FittedScrew, Failure> {
         let config = self.config;
         let axis = config.actuator[at].axis.clone();
-        let (model, outliers) = match plan.method {
+        let fitted = match plan.method {
             Method::LeastSquares => {
                 let options = FitOptions {
                     lead: Some(Metres::from_mm(config.actuator[at].lead_mm)),
@@ -207,7 +217,11 @@ impl AlignmentPlatform<'_> {
                 };
                 let fitted = screw::fit(strokes, &options);
                 let fitted = fitted.map_err(|source| PlatformFailure::Fit { axis, source })?;
-                (fitted.model, fitted.outliers)
+                FittedScrew {
+                    model: fitted.model,
+                    outliers: fitted.outliers,
+                    parts: fitted.parts,
+                }
             }
             Method::Patent => {
                 // The mean over strokes reached in reverse, from a zero set forward, is what the
@@ -216,11 +230,15 @@ impl AlignmentPlatform<'_> {
                 let strokes: Vec<_> = strokes.iter().filter(reverse).copied().collect();
                 let estimate = patent::estimate(&strokes);
                 let estimate = estimate.map_err(|source| PlatformFailure::Fit { axis, source })?;
-                (estimate.model(), Vec::new())
+                FittedScrew {
+                    model: estimate.model(),
+                    outliers: Vec::new(),
+                    parts: estimate.parts(),
+                }
             }
         };
-        self.prepare_screw(at, model.clone())?;
-        Ok((model, outliers))
+        self.prepare_screw(at, fitted.model.clone())?;
+        Ok(fitted)
     }
 
     /// Proves that a model can be applied within the limits of the configuration.
@@ -259,7 +277,7 @@ impl AlignmentPlatform<'_> {
         journal: &Journal<PlatformLog>,
         plan: &PlatformCalibrateConfig,
         strokes: &[Vec<Stroke>],
-        fitted: &[(ScrewModel, Vec<StrokeOutlier>)],
+        fitted: &[FittedScrew],
     ) -> Result<Vec<ScrewCalibrated>, Failure> {
         let method = match plan.method {
             Method::LeastSquares => ScrewMethodName::LeastSquares,
@@ -267,7 +285,12 @@ impl AlignmentPlatform<'_> {
         };
         let source = journal.path().file_name().unwrap_or_default();
         let mut calibrated = Vec::new();
-        for (at, (model, outliers)) in fitted.iter().enumerate() {
+        for (at, fitted) in fitted.iter().enumerate() {
+            let FittedScrew {
+                model,
+                outliers,
+                parts,
+            } = fitted;
             let axis = self.state.screws[at].axis.clone();
             let head = RecordHead {
                 created: utc_now(),
@@ -277,13 +300,22 @@ impl AlignmentPlatform<'_> {
             };
             let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
             let content = ScrewContent::new(model, method, rows).without(outliers);
-            let id = store.save(&CalibrationRecord { head, content })?;
+            let content = content.with_budget(parts.as_ref(), &strokes[at]);
+            let content = content.map_err(|source| Failure::Budget {
+                axis: axis.clone(),
+                source,
+            })?;
+            let id = store.save(&CalibrationRecord {
+                head,
+                content: content.clone(),
+            })?;
             calibrated.push(ScrewCalibrated {
                 axis,
                 id,
                 model: model.clone(),
                 strokes: strokes[at].len(),
                 outliers: outliers.clone(),
+                content,
             });
         }
         // Only when all of them are on the disk.

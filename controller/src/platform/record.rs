@@ -1,8 +1,11 @@
 //! What is known of a ball screw (`screw_model`).
 
-use compensator::screw::{Harmonic, ScrewModel, StrokeOutlier};
+use compensator::budget::BudgetError;
+use compensator::screw::{Harmonic, ScatterParts, ScrewModel, Stroke, StrokeOutlier};
 use serde::{Deserialize, Serialize};
-use units::Metres;
+use units::{Approach, Metres};
+
+use crate::store::budget::PlacesBudgetRecord;
 
 /// How a screw's model was estimated, and so by which rule it is applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,6 +58,10 @@ pub struct ScrewContent {
     /// Strokes that were left out because they do not fit the others.
     #[serde(default)]
     pub outliers: Vec<StrokeRecord>,
+    /// What makes the place of a single stop uncertain, from either side at each stroke and half-way between two;
+    /// `None` where that is not known, and in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<PlacesBudgetRecord>,
 }
 
 /// A stroke that was measured, metres; `approach` is `+` or `-`.
@@ -99,7 +106,41 @@ impl ScrewContent {
             covariance_si: model.covariance.clone(),
             scatter_m: model.scatter.map(Metres::value),
             outliers: Vec::new(),
+            budget: None,
         }
+    }
+
+    /// The same with what its uncertainty is made of, where `parts` say that, at these `strokes` and half-way
+    /// between two.
+    ///
+    /// # Errors
+    /// When a figure is no uncertainty.
+    pub fn with_budget(
+        mut self,
+        parts: Option<&ScatterParts>,
+        strokes: &[Stroke],
+    ) -> Result<Self, BudgetError> {
+        let Some(parts) = parts else {
+            return Ok(self);
+        };
+        let mut places: Vec<f64> = strokes.iter().map(|it| it.stroke.value()).collect();
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        let between: Vec<f64> = places
+            .windows(2)
+            .map(|it| f64::midpoint(it[0], it[1]))
+            .collect();
+        places.extend(between);
+        places.sort_by(f64::total_cmp);
+        let sides = [Approach::Forward, Approach::Reverse];
+        let places = places.into_iter();
+        let places = places.flat_map(|it| sides.map(|side| (Metres(it), side)));
+        let places: Vec<_> = places.collect();
+        let budget = parts.budget(&self.model(), &places)?;
+        let places = places.into_iter();
+        let places = places.map(|(at, side)| (vec![at.value()], Some(side)));
+        self.budget = Some(PlacesBudgetRecord::new(&budget, places.collect()));
+        Ok(self)
     }
 
     /// With the strokes that were left out of the estimate.

@@ -1,12 +1,16 @@
 //! Whether a calibration of a platform's screw can be so.
 
+use compensator::uncertainty::combine;
 use machine::records::Content;
 use machine::records::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, LENGTH_M, PLACE_M, SLOPE, approach, as_many, counted,
     increasing, is, limits, number, numbers, optional,
 };
 
+use units::{Approach, Metres};
+
 use crate::platform::ScrewContent;
+use crate::store::budget::PlacesBudgetRecord;
 
 /// Periodic terms of a screw at most, and the finest of them.
 const HARMONICS_MAX: usize = 100;
@@ -58,7 +62,21 @@ fn screw(it: &ScrewContent) -> Judged {
     }
     it.covariance_si
         .as_ref()
-        .map_or(Ok(()), |own| covariance(own, 3 + 2 * it.harmonics.len()))
+        .map_or(Ok(()), |own| covariance(own, 3 + 2 * it.harmonics.len()))?;
+    it.budget.as_ref().map_or(Ok(()), |own| budget(it, own))
+}
+
+/// A budget comes to what the model states of a single stop.
+fn budget(it: &ScrewContent, budget: &PlacesBudgetRecord) -> Judged {
+    let model = it.model();
+    let stated = budget.places.iter().enumerate().map(|(at, place)| {
+        let stroke = place.at_si.first().copied().unwrap_or(f64::NAN);
+        let side = place.side().unwrap_or(Approach::Forward);
+        let of_model = model.predict(Metres(stroke), side).standard_uncertainty;
+        let of_model = of_model.map_or(f64::NAN, Metres::value);
+        (at, combine(&[of_model, it.scatter_m.unwrap_or_default()]))
+    });
+    budget.judge(&stated.collect::<Vec<_>>())
 }
 
 /// Square, symmetric, no negative variance, no more common than both have on their own.

@@ -377,6 +377,12 @@ fn check_platform_calibration(desk: &Desk, calibrated: &PlatformCalibrated) {
             u,
             behind(own_page, "lost motion (µm) ", 2)[1],
         );
+        check_budget(
+            &screw["uncertainty"],
+            content,
+            ("expanded_um", UM),
+            (&lines, &[own_text, own_page]),
+        );
         let scatter = at(screw, "/scatter_um");
         stored(scatter, at(content, "/scatter_m"), UM);
         everywhere(scatter, &[(own_page, "scatters by ")]);

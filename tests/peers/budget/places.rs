@@ -4,11 +4,13 @@
 use compensator::rotary::{
     PeriodicInterpolation, Placement, RotarySeries, Solution, SolveOptions, solve,
 };
+use compensator::screw::{self, FitOptions, Stroke};
 use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use tests::normal;
+use truestage::platform::ScrewContent;
 use truestage::rotary::RotaryContent;
-use units::Radians;
+use units::{Approach, Metres, Radians};
 
 use super::assert_close;
 use crate::peer::Peer;
@@ -81,5 +83,54 @@ fn gtc_comes_to_the_budget_of_a_rotary_table_from_its_record_and_from_its_readin
         let u = ours["u_si"].as_f64().expect("a number");
         assert_close("u of a line", u, &again[line][0], u);
         check_freedom(&ours["degrees_of_freedom"], &again[line][1]);
+    }
+}
+
+/// So often each of nine strokes is made from either side.
+const REPEATED: usize = 3;
+
+fn strokes() -> Vec<Stroke> {
+    let state = &mut 23;
+    let mut strokes = Vec::new();
+    for at in -4..=4 {
+        let stroke = Metres(f64::from(at) * 5e-4);
+        let own = 2e-7 * normal(state);
+        for (approach, lost_motion) in [(Approach::Forward, 0.0), (Approach::Reverse, 2e-6)] {
+            for _ in 0..REPEATED {
+                let off = own + lost_motion + 1e-7 * normal(state);
+                let deviation = stroke * 1e-3 + Metres(off);
+                strokes.push(Stroke {
+                    approach,
+                    stroke,
+                    deviation,
+                });
+            }
+        }
+    }
+    strokes
+}
+
+#[test]
+fn gtc_comes_to_the_budget_of_a_screw_from_its_record_and_from_its_strokes() {
+    let strokes = strokes();
+    let fitted = screw::fit(&strokes, &FitOptions::default()).expect("they tell it");
+    let rows = u32::try_from(strokes.len()).expect("a few");
+    let content = ScrewContent::new(&fitted.model, Default::default(), rows);
+    let content = content.with_budget(fitted.parts.as_ref(), &strokes);
+    let content = json!(content.expect("its figures are finite"));
+    let mut made: Vec<f64> = strokes.iter().map(|it| it.stroke.value()).collect();
+    made.dedup();
+    let task = json!({"of": "screw", "strokes": made, "repeated": REPEATED});
+    let again = check_record(&content, task);
+    let places = content["budget"]["places"].as_array().expect("it has them");
+    assert_eq!(
+        places.len(),
+        2 * (2 * made.len() - 1),
+        "both sides, and between"
+    );
+    for (place, theirs) in places.iter().zip(again.as_array().expect("a list")) {
+        let u = place["u_si"].as_f64().expect("a number");
+        assert_close("u of a stop", u, &theirs[0], u);
+        check_freedom(&place["degrees_of_freedom"], &theirs[1]);
     }
 }

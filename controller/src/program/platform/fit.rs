@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use compensator::screw::{
     self, FitError, FitOptions, Fitted, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
-use compensator::screw::{AxisStrokes, StrokeSeries};
+use compensator::screw::{AxisStrokes, ScatterParts, Stroke, StrokeSeries};
 use machine::records::{CalibrationRecord, short};
 use serde_json::{Value, json};
 use units::{Metres, Short};
@@ -14,10 +14,11 @@ use units::{Metres, Short};
 use crate::platform::PlatformConfig;
 use crate::platform::PlatformFailure;
 use crate::platform::{ScrewContent, ScrewMethodName};
+use crate::program::budget;
 use crate::program::data_file::head_of;
 use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
-use crate::program::platform::json as to_json;
+use crate::program::platform::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
 use crate::program::text;
 use crate::program::text::ScrewTerm;
@@ -60,6 +61,8 @@ struct Estimated<'a> {
     rows: usize,
     model: ScrewModel,
     outliers: Vec<StrokeOutlier>,
+    parts: Option<ScatterParts>,
+    strokes: &'a [Stroke],
     text: String,
     value: Value,
 }
@@ -128,6 +131,8 @@ fn patent(strokes: &AxisStrokes) -> Result<Estimated<'_>, FitError> {
         rows: estimate.rows,
         model: estimate.model(),
         outliers: Vec::new(),
+        parts: estimate.parts(),
+        strokes: &strokes.strokes,
         text,
         value: to_json::patent(&estimate),
     })
@@ -165,6 +170,8 @@ fn least_squares(strokes: &AxisStrokes, lead_mm: Option<f64>) -> Result<Estimate
         value: to_json::fitted(&fitted, rows, &strokes.lines),
         model: fitted.model,
         outliers: fitted.outliers,
+        parts: fitted.parts,
+        strokes: &strokes.strokes,
         text,
     })
 }
@@ -259,6 +266,11 @@ fn save(path: &Path, args: &ScrewArgs, axes: &[Estimated<'_>]) -> Result<Vec<Str
         })?;
         let rows = u32::try_from(it.rows).unwrap_or(u32::MAX);
         let content = ScrewContent::new(&it.model, method, rows).without(&it.outliers);
+        let content = content.with_budget(it.parts.as_ref(), it.strokes);
+        let content = content.map_err(|source| Failure::Budget {
+            axis: it.axis.to_owned(),
+            source,
+        })?;
         records.push(CalibrationRecord { head, content });
     }
     let store = loaded.config.machine.store();
@@ -312,7 +324,7 @@ fn shown(content: &ScrewContent) -> String {
         Short(Metres(content.last_stroke_m).mm()),
         content.method.in_words(),
         model_text(&content.model()),
-    )
+    ) + &budget::lines(uncertainty::worst(content))
 }
 
 /// Two stored models, for `cal diff`.

@@ -10,6 +10,7 @@ mod report;
 mod stored_tests;
 mod target;
 mod told;
+mod uncertainty;
 pub(crate) mod verbs;
 
 use std::path::Path;

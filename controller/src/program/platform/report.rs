@@ -13,8 +13,10 @@ use crate::platform::PlatformLog;
 use crate::platform::state::difference;
 use crate::platform::verify::{PoseChecked, PoseFigures};
 use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
+use crate::program::budget;
 use crate::program::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
 use crate::program::page::{IN_USE, document, escape, facts};
+use crate::program::platform::uncertainty;
 use crate::program::text;
 
 /// How finely a model's curve is drawn.
@@ -284,11 +286,12 @@ fn screws(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -> String 
             Some((id, content)) => {
                 let _ = write!(
                     html,
-                    "<p>calibration {}, {} strokes, a single stop scatters by {} µm</p>{}",
+                    "<p>calibration {}, {} strokes, a single stop scatters by {} µm</p>{}{}",
                     short(id),
                     strokes.len(),
                     or_dash(content.scatter_m.map(|it| um(Metres(it)))),
-                    screw_table(content)
+                    screw_table(content),
+                    budget::html(uncertainty::worst(content))
                 );
             }
             None => html += "<p>No calibration was made from this run.</p>",

@@ -11,6 +11,7 @@ use crate::program::json as to_json;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::platform::fit::outlier_lines;
 use crate::program::platform::target::NamedPose;
+use crate::program::platform::uncertainty;
 use crate::program::session::Session;
 use crate::program::text::verdict;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
@@ -298,6 +299,9 @@ pub(crate) fn calibrated_text(calibrated: &PlatformCalibrated) -> String {
             model.harmonics.len(),
             &screw.id[..12]
         );
+        if let Some(worst) = uncertainty::worst(&screw.content) {
+            text += &format!("\n    {}", worst.sentence());
+        }
         text += &outlier_lines(&screw.outliers, &[]);
     }
     text
@@ -316,6 +320,7 @@ pub(crate) fn calibrated_value(calibrated: &PlatformCalibrated) -> Value {
                 "lost_motion_um": to_json::um(screw.model.lost_motion),
                 "lost_motion_um_u": screw.model.u_lost_motion().map(to_json::um),
                 "scatter_um": screw.model.scatter.map(to_json::um),
+                "uncertainty": uncertainty::value(&screw.content),
                 "outliers": crate::program::platform::json::outliers(&screw.outliers, &[]),
                 "harmonics": screw.model.harmonics.iter().map(|it| it.number).collect::<Vec<_>>(),
             })
