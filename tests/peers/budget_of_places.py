@@ -80,9 +80,19 @@ def of_screw(task):
     return places
 
 
+def of_tool(task):
+    """The length of a tool's deviation by what each reading, off by its standard uncertainty, moves it by."""
+    lengths = []
+    for pulls in task["pulls"]:
+        readings = [ureal(0, 1) for _ in pulls[0]]
+        each = [uncertainty(combined(row, readings)) for row in pulls]
+        lengths.append(math.hypot(*each))
+    return lengths
+
+
 def main():
     task = json.load(sys.stdin)
-    again = {"table": of_table, "screw": of_screw}[task["of"]](task)
+    again = {"table": of_table, "screw": of_screw, "tool": of_tool}[task["of"]](task)
     print(json.dumps({"record": of_record(task["budget"]), "again": again}), flush=True)
 
 

@@ -630,6 +630,8 @@ fn check_volumetric_calibration(desk: &Desk, made: &VolumetricCalibrated) {
         everywhere(freedom, &[(text, " readings, ")]);
         everywhere(ratio, &[(text, "scatter ")]);
     }
+    let (of_json, expanded) = (&json["uncertainty"], ("expanded_um", UM));
+    check_budget(of_json, content, expanded, (&lines, &[&text, &page]));
     let functions = list(content, "/functions");
     let table = &page[page.find("u (largest)").unwrap()..];
     for function in functions {

@@ -19,6 +19,7 @@ use compensator::volumetric::online::{BeamDrift, BeamReference};
 use serde::{Deserialize, Serialize};
 use units::{Celsius, Metres, Quantity, Radians};
 
+use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{IdentityRecord, StoreError, short};
 
 pub(crate) use agreement::AgreementRecord;
@@ -161,6 +162,10 @@ pub struct GeometryContent {
     /// not found from readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<CovarianceRecord>,
+    /// What makes the tool in use uncertain, at places all over the volume: the length of its deviation; `None` in
+    /// files of earlier programs, and where the errors were not found from readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<PlacesBudgetRecord>,
 }
 
 fn error_names() -> impl Iterator<Item = ErrorName> {
@@ -203,6 +208,7 @@ impl GeometryContent {
             unknown: UnknownRecord::default(),
             agreement: None,
             covariance: None,
+            budget: None,
         }
     }
 

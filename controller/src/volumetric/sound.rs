@@ -115,7 +115,14 @@ fn geometry(it: &GeometryContent) -> Judged {
     let spare = own.degrees_of_freedom;
     counted("agreement.degrees_of_freedom", spare, 0..=own.readings)?;
     optional("agreement.scatter_ratio", own.scatter_ratio, &RATIO)?;
-    number("agreement.tool_u_max_m", own.tool_u_max_m, &ERROR_U_M)
+    number("agreement.tool_u_max_m", own.tool_u_max_m, &ERROR_U_M)?;
+    let Some(budget) = &it.budget else {
+        return Ok(());
+    };
+    let places = budget.places.iter().enumerate();
+    let most = places.reduce(|most, it| if it.1.u_si > most.1.u_si { it } else { most });
+    let stated = most.map(|(at, _)| (at, own.tool_u_max_m));
+    budget.judge(stated.as_slice())
 }
 
 fn warmth(it: &GeometryContent) -> Judged {

@@ -1,10 +1,17 @@
 //! The budgets that calibrations keep place by place, computed again: by GTC from their contributions, and by GTC
 //! from the readings, for which `budget_of_places.py` does its own least squares.
 
+use compensator::budget::COVERAGE_FACTOR;
 use compensator::rotary::{
     PeriodicInterpolation, Placement, RotarySeries, Solution, SolveOptions, solve,
 };
 use compensator::screw::{self, FitOptions, Stroke};
+use compensator::volumetric::function::Shape;
+use compensator::volumetric::identify::{
+    FunctionPlan, Observation, Plan, Reading, RunSetup, ThermalPlan, ToolAt,
+};
+use compensator::volumetric::model::ErrorName;
+use compensator::volumetric::{Axis, Point};
 use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use tests::normal;
@@ -132,5 +139,128 @@ fn gtc_comes_to_the_budget_of_a_screw_from_its_record_and_from_its_strokes() {
         let u = place["u_si"].as_f64().expect("a number");
         assert_close("u of a stop", u, &theirs[0], u);
         check_freedom(&place["degrees_of_freedom"], &theirs[1]);
+    }
+}
+
+/// A reading of x at `mm`, on a tool so far below the slide.
+fn reading(run: usize, mm: f64, below_mm: f64, reading: Reading) -> Observation {
+    Observation {
+        at: Point::from_mm(mm, 0.0, 0.0),
+        tool: Point::from_mm(0.0, 0.0, -below_mm),
+        run,
+        reading,
+    }
+}
+
+/// Positioning and pitch of x, by lengths in two heights and by angles.
+fn lines() -> (Plan, Vec<Observation>) {
+    let nodes = [0.0, 200.0].map(Metres::from_mm).to_vec();
+    let function = |name| FunctionPlan {
+        name,
+        nodes: nodes.clone(),
+    };
+    let offset = RunSetup {
+        offset: true,
+        alignment: None,
+    };
+    let plan = Plan {
+        chain: "FXYZ".parse().expect("it is one"),
+        functions: vec![
+            function(ErrorName::Along(Axis::X, Axis::X)),
+            function(ErrorName::About(Axis::X, Axis::Y)),
+        ],
+        shape: Shape::Linear,
+        squarenesses: Vec::new(),
+        runs: vec![offset; 3],
+        zero: Point::ZERO,
+        thermal: ThermalPlan::default(),
+    };
+    let length = |um: f64| Reading::Length {
+        along: [1.0, 0.0, 0.0],
+        deviation: Metres::ZERO,
+        u: Metres::from_um(um),
+    };
+    let angle = Reading::Angle {
+        about: Axis::Y,
+        deviation: Radians::ZERO,
+        u: Radians(1e-6),
+    };
+    let stops = [0.0, 40.0, 90.0, 150.0, 200.0];
+    let observations = stops.iter().flat_map(|mm| {
+        [
+            reading(0, *mm, 0.0, length(0.1 + 0.001 * mm)),
+            reading(1, *mm, 120.0, length(0.2)),
+            reading(2, *mm, 0.0, angle),
+        ]
+    });
+    (plan, observations.collect())
+}
+
+/// How far the tool goes along x and z at a place, by the errors that `observations` tell.
+fn moved(plan: &Plan, observations: &[Observation], (at, tool): ToolAt) -> [f64; 2] {
+    let found = plan.identify(observations).expect("they tell all of it");
+    let axes = found.axis_errors(plan.shape).expect("they are functions");
+    let x = at.along(Axis::X);
+    let along = axes[0].along[0].as_ref().map_or(0.0, |it| it.at(x).value());
+    let pitch = axes[0].about[1].as_ref().map_or(0.0, |it| it.at(x).value());
+    let lever = plan.chain.lever(Axis::X, at, tool);
+    [
+        along + pitch * lever.along(Axis::Z).value(),
+        -pitch * lever.along(Axis::X).value(),
+    ]
+}
+
+/// What each reading that is off by its standard uncertainty moves the tool by, along x and along z.
+fn pulls(plan: &Plan, observations: &[Observation], place: ToolAt) -> [Vec<f64>; 2] {
+    let each = (0..observations.len()).map(|at| {
+        let mut off = observations.to_vec();
+        match &mut off[at].reading {
+            Reading::Length { deviation, u, .. } => *deviation = *u,
+            Reading::Angle { deviation, u, .. } => *deviation = *u,
+        }
+        moved(plan, &off, place)
+    });
+    let each: Vec<[f64; 2]> = each.collect();
+    [0, 1].map(|k| each.iter().map(|it| it[k]).collect())
+}
+
+#[test]
+fn gtc_comes_to_the_budget_of_three_axes_from_what_each_reading_moves() {
+    let (plan, observations) = lines();
+    let place = |mm: f64, below: f64| {
+        (
+            Point::from_mm(mm, 0.0, 0.0),
+            Point::from_mm(30.0, 0.0, -below),
+        )
+    };
+    let places = [place(0.0, 0.0), place(70.0, 50.0), place(200.0, 120.0)];
+    let source = |at: usize| format!("line {}", observations[at].run);
+    let budget = plan.budget(&observations, source, &[], &places);
+    let budget = budget.expect("they tell all of it");
+    let combined = |at: usize| {
+        let it = budget.at(at);
+        json!({
+            "sensitivities": budget.sensitivities()[at],
+            "u_si": it.standard_uncertainty.value(),
+            "expanded_u_si": it.expanded().value(),
+            "degrees_of_freedom": it.degrees_of_freedom,
+        })
+    };
+    let lines = budget.contributions().iter();
+    let lines =
+        lines.map(|it| json!({"value": it.value, "degrees_of_freedom": it.degrees_of_freedom}));
+    let kept = json!({"budget": {
+        "coverage_factor": COVERAGE_FACTOR,
+        "contributions": lines.collect::<Vec<_>>(),
+        "places": (0..places.len()).map(combined).collect::<Vec<_>>(),
+    }});
+    let pulls: Vec<_> = places
+        .iter()
+        .map(|it| pulls(&plan, &observations, *it))
+        .collect();
+    let again = check_record(&kept, json!({"of": "tool", "pulls": pulls}));
+    for at in 0..places.len() {
+        let u = budget.at(at).standard_uncertainty.value();
+        assert_close("u of the tool", u, &again[at], u);
     }
 }

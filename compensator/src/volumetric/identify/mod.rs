@@ -41,6 +41,7 @@
 
 mod between;
 mod block;
+mod budget;
 mod cause;
 mod design;
 mod diagonals;
@@ -60,6 +61,7 @@ use core::fmt;
 use units::{Metres, Quantity, Radians};
 
 use between::Extent;
+pub use budget::ToolAt;
 pub use cause::{Cause, Causes, Circumstance, Doubt, Explanation, Suspect, Trial, suspects};
 pub use diagonals::{body_diagonals, direction, face_diagonals, squareness_of_face_diagonals};
 pub use observe::Observability;
@@ -73,6 +75,7 @@ pub use thermal::{BendPlan, ExpansionPlan, IdentifiedBend, IdentifiedExpansion, 
 use super::function::Shape;
 use super::model::{Chain, ErrorName};
 use super::{Axis, Point};
+use crate::budget::BudgetError;
 use crate::least_squares::LeastSquaresError;
 
 /// One of the three squarenesses, as in [`Squareness`](super::model::Squareness).
@@ -352,6 +355,9 @@ pub enum IdentifyError {
     /// Least squares failed.
     #[error(transparent)]
     LeastSquares(#[from] LeastSquaresError),
+    /// What makes the errors uncertain makes no budget.
+    #[error(transparent)]
+    Budget(#[from] BudgetError),
 }
 
 impl Plan {

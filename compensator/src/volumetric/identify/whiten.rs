@@ -11,7 +11,7 @@
 //! |---|---|
 //! | L, in units of the readings' own uncertainties | [`Whitening::factor`] |
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// By reading, how uncertain it is, and what it shares with others.
 #[derive(Clone, Debug, Default)]
@@ -76,6 +76,17 @@ impl Whitening {
         let mut weighted: Vec<f64> = column.iter().zip(&self.own).map(|(it, u)| it / u).collect();
         self.whiten(&mut weighted, 1);
         weighted
+    }
+
+    /// L⁻ᵀ of what whitened readings do: what each reading does, in units of its own uncertainty.
+    pub(super) fn of_influence(&self, whitened: &[f64]) -> Vec<f64> {
+        let Some(factor) = &self.factor else {
+            return whitened.to_vec();
+        };
+        let mut turned = DVector::from_column_slice(whitened);
+        // The diagonal of a Cholesky factor has no zero.
+        factor.tr_solve_lower_triangular_mut(&mut turned);
+        turned.as_slice().to_vec()
     }
 
     /// By reading, L⁻¹ of what is one SI unit off in this reading alone.

@@ -17,6 +17,7 @@ use crate::program::data_file::volume_head_of;
 use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::shown;
+use crate::program::volumetric::uncertainty;
 use crate::program::volumetric::verbs::{add_unknown, found_value, unknown_text, warmth_text};
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::calibrate::VolumetricEvaluated;
@@ -83,6 +84,7 @@ pub(crate) fn fit(args: &VolumetricArgs, output: Output) -> Ended {
     value["lines"] = json!(evaluated.lines);
     value["readings"] = json!(evaluated.readings);
     value["u_tool_max_um"] = json!(evaluated.u_max.um());
+    value["uncertainty"] = uncertainty::value(content.budget.as_ref());
     add_unknown(&mut value, &content.unknown);
     value["functions"] = json!(content.functions);
     let arcsec = |it: f64| Radians(it).arcsec();

@@ -12,6 +12,7 @@ pub(crate) mod shown;
 #[cfg(test)]
 mod stored_tests;
 mod told;
+mod uncertainty;
 pub(crate) mod verbs;
 
 use std::path::Path;

@@ -9,11 +9,12 @@ use compensator::volumetric::Axis;
 use machine::records::{ReadJournal, Store, StoreError};
 use units::{Metres, Radians};
 
+use crate::program::budget;
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
 use crate::program::page::{document, escape, facts};
 use crate::program::text::verdict;
-use crate::program::volumetric::shown;
+use crate::program::volumetric::{shown, uncertainty};
 use crate::volumetric::verify::from_the_first;
 use crate::volumetric::{
     FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeLog,
@@ -298,6 +299,7 @@ pub(crate) fn geometry(content: &GeometryContent) -> String {
         .agreement
         .as_ref()
         .map_or_else(String::new, agreement::figures);
+    html += &budget::html(uncertainty::worst(content.budget.as_ref()));
     for (axis, names) in Axis::ALL.into_iter().zip(NAMES) {
         let [along, about] = names;
         let title = format!("Displacements of {axis}");

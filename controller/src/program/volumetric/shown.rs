@@ -4,7 +4,9 @@ mod references;
 
 use serde_json::json;
 
+use crate::program::budget;
 use crate::program::show::{Changes, Show};
+use crate::program::volumetric::uncertainty;
 use crate::volumetric::{
     BeamReferencesContent, FunctionRecord, GeometryContent, StateMemoryContent,
 };
@@ -59,7 +61,7 @@ pub(crate) fn shown(content: &GeometryContent) -> String {
     for (name, value, u) in squarenesses(content) {
         text += &format!("\n  {name}: {value:+.3} ″, u {u:.3} ″");
     }
-    text
+    text + &budget::lines(uncertainty::worst(content.budget.as_ref()))
 }
 
 /// What is shown of an error function, in micrometres or arcseconds.

@@ -18,8 +18,10 @@ use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::text::verdict;
+use crate::program::volumetric::uncertainty;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::runs::Told;
+use crate::store::budget::PlacesBudgetRecord;
 use crate::volumetric::UnknownRecord;
 use crate::volumetric::verify::VolumetricVerified;
 use crate::volumetric::{GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, WarmUp};
@@ -120,8 +122,16 @@ pub(crate) fn calibrated_text(made: &VolumetricCalibrated) -> String {
         short(&made.references),
         made.agreement.readings_text(),
         made.agreement.tool_text(),
-        warmth_text(&made.found) + &unknown_text(&made.unknown),
+        budget_text(made.budget.as_ref())
+            + &warmth_text(&made.found)
+            + &unknown_text(&made.unknown),
     )
+}
+
+/// What makes the tool uncertain, in a line.
+fn budget_text(budget: Option<&PlacesBudgetRecord>) -> String {
+    let worst = uncertainty::worst(budget);
+    worst.map_or_else(String::new, |it| format!("\n  {}", it.sentence()))
 }
 
 /// What warmth does, a line each.
@@ -171,6 +181,7 @@ pub(crate) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
     value["lines"] = json!(made.lines);
     value["journal"] = json!(made.journal);
     value["u_tool_max_um"] = json!(made.u_max.um());
+    value["uncertainty"] = uncertainty::value(made.budget.as_ref());
     add_unknown(&mut value, &made.unknown);
     value
 }

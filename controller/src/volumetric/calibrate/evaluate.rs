@@ -12,18 +12,18 @@ use units::{Celsius, Metres};
 use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::store::IdentityRecord;
+use crate::store::budget::PlacesBudgetRecord;
 use crate::volumetric::VolumetricConfig;
+use crate::volumetric::calibrate::budget::{budget, grid, places};
 use crate::volumetric::calibrate::cause::LikelyCauses;
 use crate::volumetric::calibrate::plan::axis_of;
 use crate::volumetric::settings::{beam_drift, bend_plans};
 use crate::volumetric::{
     AgreementRecord, BeamReferencesContent, BendRecord, CovarianceRecord, ExpansionRecord,
-    GeometryContent, LineEntry, UnknownRecord, VolumeLog, VolumePlanEntry, error_name, point,
+    GeometryContent, LineEntry, LineReadEntry, UnknownRecord, VolumeLog, VolumePlanEntry,
+    error_name, point,
 };
 use crate::volumetric::{Scatter, VolumetricCorrection, VolumetricFailure, VolumetricState};
-
-/// Places between which the uncertainty of the tool is looked for, along each axis.
-const PLACES: u32 = 4;
 
 /// What readings of lines say of three axes.
 #[derive(Clone, Debug)]
@@ -42,6 +42,8 @@ pub struct VolumetricEvaluated {
     pub u_max: Metres,
     /// Readings that are grossly wrong, or scatter more than they may.
     pub scatter: Option<Scatter>,
+    /// What makes that uncertain; `None` of readings that are not to be used.
+    budget: Option<PlacesBudgetRecord>,
     drives: Vec<IdentityRecord>,
     /// Errors that move nothing with the tools given: taken as zero.
     without_effect: Vec<ErrorName>,
@@ -66,8 +68,19 @@ impl VolumetricEvaluated {
             let causes = LikelyCauses::of((&plan, &observations, &gross), entry, read);
             Scatter::of(&scattered, (&gross, causes), entry, read, &observations)
         });
+        let budget = match scatter {
+            Some(_) => None,
+            None => {
+                let lines: Vec<_> = whole_of(entry, read)
+                    .map(|it| &entry.lines[it.line])
+                    .collect();
+                let of = (&plan, observations.as_slice(), &found);
+                budget(entry, &lines, of, &temperatures).map_err(VolumetricFailure::from)?
+            }
+        };
         Ok(Self {
             scatter,
+            budget,
             u_max: largest_u(entry, &found, &temperatures),
             found,
             axes,
@@ -104,6 +117,7 @@ impl VolumetricEvaluated {
             drives: self.drives.clone(),
             agreement: Some(self.agreement()),
             covariance: self.covariance(config).as_ref().map(CovarianceRecord::of),
+            budget: self.budget.clone(),
             unknown: UnknownRecord::of(&unknown, &self.without_effect),
             ..GeometryContent::new(of.0, of.1, of.2)
         }
@@ -203,8 +217,7 @@ fn plan_of(
     read: &VolumeLog,
     shape: Shape,
 ) -> Option<(Plan, Vec<Observation>)> {
-    let whole = read.whole.iter();
-    let whole: Vec<_> = whole.filter(|it| it.line < entry.lines.len()).collect();
+    let whole: Vec<_> = whole_of(entry, read).collect();
     let mut observations = Vec::new();
     for (run, it) in whole.iter().enumerate() {
         let own = read
@@ -235,6 +248,15 @@ fn plan_of(
         thermal: thermal_of(entry, references(read), shown.collect())?,
     };
     Some((plan, observations))
+}
+
+/// The lines that were read whole: a run each.
+fn whole_of<'a>(
+    entry: &VolumePlanEntry,
+    read: &'a VolumeLog,
+) -> impl Iterator<Item = &'a LineReadEntry> {
+    let lines = entry.lines.len();
+    read.whole.iter().filter(move |it| it.line < lines)
 }
 
 fn setup(line: &LineEntry) -> RunSetup {
@@ -283,18 +305,9 @@ fn thermal_of(
 
 /// At the tool in use, over places all over the volume.
 fn largest_u(entry: &VolumePlanEntry, found: &Identified, shown: &[Celsius]) -> Metres {
-    let along = |k: usize| places(entry.low_m[k], entry.high_m[k]);
-    let u_at = |at: [f64; 3]| {
-        let u = found.standard_uncertainty(point(at), point(entry.tool_m), shown);
+    let u_at = |at| {
+        let u = found.standard_uncertainty(at, point(entry.tool_m), shown);
         u.map_or(Metres::ZERO, |it| it.distance())
     };
-    let rows = along(2).flat_map(|z| along(1).map(move |y| (y, z)));
-    let all = rows.flat_map(|(y, z)| along(0).map(move |x| [x, y, z]));
-    all.map(u_at).fold(Metres::ZERO, Metres::max)
-}
-
-/// Places along one axis. Rounding must not put the last one outside the nodes, where nothing is known.
-fn places(low: f64, high: f64) -> impl Iterator<Item = f64> {
-    let inner = move |n: u32| low + (high - low) * f64::from(n) / f64::from(PLACES);
-    (0..PLACES).map(inner).chain([high])
+    grid(entry).map(u_at).fold(Metres::ZERO, Metres::max)
 }

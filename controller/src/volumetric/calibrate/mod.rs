@@ -18,6 +18,7 @@
 //! stated would explain all readings (`cause`). Lines that are named then
 //! count as not read, so that a run that is continued reads them again.
 
+mod budget;
 mod cause;
 mod evaluate;
 mod gross;
@@ -44,6 +45,7 @@ pub(crate) use scatter::Scatter;
 
 use crate::failure::Failure;
 use crate::run::{note_failure, utc_now};
+use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
@@ -91,6 +93,8 @@ pub struct VolumetricCalibrated {
     pub agreement: AgreementRecord,
     /// The largest standard uncertainty of the tool in the volume.
     pub u_max: Metres,
+    /// What makes the tool uncertain, as it was stored.
+    pub budget: Option<PlacesBudgetRecord>,
     /// What stays unknown: by how much those guides bend that bend according to the configuration,
     /// because no warm lines were read; errors that no line sees.
     pub unknown: UnknownRecord,
@@ -328,7 +332,7 @@ impl WorkVolume<'_> {
             ..self.this_volume(GEOMETRY)?
         };
         let content = evaluated.content(&session.config);
-        let unknown = content.unknown.clone();
+        let (unknown, budget) = (content.unknown.clone(), content.budget.clone());
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
         store.activate(GEOMETRY, &id)?;
@@ -339,6 +343,7 @@ impl WorkVolume<'_> {
             lines: evaluated.lines,
             found: evaluated.found,
             u_max: evaluated.u_max,
+            budget,
             unknown,
             journal: journal.path().to_owned(),
         })
