@@ -8,6 +8,7 @@ use machine::Failure;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::node::in_sight_controller::InSightControllerNode;
 use mock_bus::plant::Pose;
+use units::{Metres, Radians};
 use tests::{Desk, Emulator, Rig, Setup, on_every_rig, rigs};
 use truestage::for_tests::CameraDevice;
 
@@ -105,11 +106,12 @@ fn a_pose_is_the_true_one_but_for_the_cameras_noise() {
         assert!((seen.y - is.y).abs().um() < 0.12 * error, "{seen:?} {is:?}");
         let turn = (seen.angle - is.angle).abs().arcsec();
         assert!(turn < 0.41 * error, "{seen:?} {is:?}");
-        let (u_x, u_y, u_angle) = seen.standard_deviation;
-        for u in [u_x, u_y] {
-            assert!((0.07..0.18).contains(&u.um()), "{} um", u.um());
+        let [s_x, s_y, s_angle] = [0, 1, 2].map(|at| seen.covariance[at][at].sqrt());
+        for um in [s_x, s_y].map(|it| Metres(it).um()) {
+            assert!((0.07..0.18).contains(&um), "{um} um");
         }
-        assert!((0.25..0.6).contains(&u_angle.arcsec()), "{seen:?}");
+        let s_angle = Radians(s_angle).arcsec();
+        assert!((0.25..0.6).contains(&s_angle), "{seen:?}");
         assert_eq!((seen.samples, seen.rejected), (40, 0));
         assert!((0.9..=1.0).contains(&seen.score), "{seen:?}");
         let name = eye.device.identity().expect("it was started").name;

@@ -29,6 +29,7 @@ mod forward;
 mod presets;
 mod reach;
 
+use crate::uncertainty::propagate;
 use units::portable::{cos, hypot, sin};
 use units::{Metres, Radians};
 
@@ -185,6 +186,13 @@ impl Row {
         self.along(x, y) + self.turned(angle)
     }
 
+    /// Standard uncertainty of the stroke of a pose at `angle` with this covariance, row by row.
+    fn u_stroke(&self, angle: f64, covariance: &[f64]) -> Metres {
+        let [along_x, along_y] = self.direction;
+        let gradient = [along_x, along_y, self.per_radian(angle)];
+        Metres(propagate(&gradient, covariance).max(0.0).sqrt())
+    }
+
     /// d stroke / d angle.
     fn per_radian(&self, angle: f64) -> f64 {
         self.lever * cos(angle) - self.radial * sin(angle)
@@ -295,6 +303,15 @@ impl Platform {
     pub fn strokes(&self, pose: Pose) -> Vec<Metres> {
         let pose = pose.raw();
         self.rows.iter().map(|r| Metres(r.stroke(pose))).collect()
+    }
+
+    /// Standard uncertainties of these strokes, one per actuator, where x, y (m) and angle (rad) of the pose have this
+    /// covariance.
+    pub fn u_strokes(&self, pose: Pose, covariance: &[[f64; 3]; 3]) -> Vec<Metres> {
+        let angle = pose.angle.value();
+        let each = self.rows.iter();
+        let each = each.map(|it| it.u_stroke(angle, covariance.as_flattened()));
+        each.collect()
     }
 }
 

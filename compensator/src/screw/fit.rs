@@ -155,6 +155,8 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
     let parts = parts_of(&problem, &kept, &strata, &solved.cofactor);
     let root = |variance: f64| Metres(variance.sqrt());
     let residual = root(variances.of_one());
+    let reading = options.reading.map_or(0.0, Metres::value);
+    let of_move = root(variances.of_move(reading * reading));
     let repeatability = root(variances.repeat);
     let lack_of_fit = strata.lack_of_fit(FLOOR).map(|p_value| LackOfFit {
         p_value,
@@ -168,7 +170,7 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
             &kept,
             &solved.coefficients,
             covariance,
-            residual,
+            of_move,
         ),
         parts,
         outliers: Vec::new(),

@@ -125,8 +125,8 @@ pub struct ScrewModel {
     /// order, square row by row, SI units; widened for their degrees of freedom where these are few.
     /// `None` where nothing was left to judge by.
     pub covariance: Option<Vec<f64>>,
-    /// Standard deviation of a single move around the model, the screw's own errors at a stroke
-    /// included; `None` when nothing was repeated.
+    /// Standard deviation of a single move around the model, the screw's own errors at a stroke included, and what its
+    /// instrument does not repeat where that is not known by itself; `None` when nothing was repeated.
     pub scatter: Option<Metres>,
 }
 

@@ -15,6 +15,9 @@ pub struct FitOptions {
     pub outlier_threshold: f64,
     /// The largest share of rows that may be left out, 0 to 1.
     pub outlier_share_max: f64,
+    /// Standard uncertainty of one row by what its instrument does not repeat, where that is known: it makes rows
+    /// scatter, but not where a move ends.
+    pub reading: Option<Metres>,
 }
 
 impl Default for FitOptions {
@@ -26,6 +29,7 @@ impl Default for FitOptions {
             significance: 0.01,
             outlier_threshold: 6.0,
             outlier_share_max: 0.2,
+            reading: None,
         }
     }
 }

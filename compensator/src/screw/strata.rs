@@ -93,6 +93,13 @@ impl Variances {
         self.stroke.max(0.0) + self.side.max(0.0) + self.repeat
     }
 
+    /// Of where a single stroke ends about the model; `reading` is the variance of what the instrument does not repeat,
+    /// which repetitions show as well.
+    pub(super) fn of_move(&self, reading: f64) -> f64 {
+        let repeat = (self.repeat - reading).max(0.0);
+        Self { repeat, ..*self }.of_one()
+    }
+
     /// Of the mean of so many repetitions, the error of the stroke apart.
     pub(super) fn of_cell(&self, count: f64) -> f64 {
         self.side + self.repeat / count

@@ -17,6 +17,7 @@ use crate::failure::Failure;
 use crate::platform::config::ScrewMethodName as Method;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::look::Seen;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
@@ -40,6 +41,27 @@ pub struct ScrewCalibrated {
     pub outliers: Vec<StrokeOutlier>,
     /// As it is stored.
     pub content: ScrewContent,
+}
+
+/// What was measured of a screw.
+#[derive(Clone, Debug, Default)]
+struct MeasuredScrew {
+    strokes: Vec<Stroke>,
+    /// Of what was seen of each by what pictures do not repeat, m²; fewer where that is not known.
+    variances: Vec<f64>,
+}
+
+impl MeasuredScrew {
+    /// Standard uncertainty of one of them by what pictures do not repeat.
+    fn reading(&self) -> Option<Metres> {
+        let known = !self.strokes.is_empty() && self.variances.len() == self.strokes.len();
+        let mean = || self.variances.iter().sum::<f64>() / self.variances.len() as f64;
+        known.then(|| Metres(mean().sqrt()))
+    }
+}
+
+fn square(length: Metres) -> f64 {
+    length.value() * length.value()
 }
 
 /// What the strokes of a screw say.
@@ -119,22 +141,29 @@ impl AlignmentPlatform<'_> {
         plan: &PlatformCalibrateConfig,
         journal: &mut Journal<PlatformLog>,
         sightings: &mut Vec<Sighting>,
-    ) -> Result<(Vec<Vec<Stroke>>, Metres), Failure> {
+    ) -> Result<(Vec<MeasuredScrew>, Metres), Failure> {
         let count = self.state.screws.len();
         let targets: Vec<_> = (0..count).map(|at| self.targets(at, plan)).collect();
         let stops: usize = targets.iter().map(|it| 2 * it.len()).sum();
         let total = stops as u64 * u64::from(plan.runs);
-        let mut all = vec![Vec::new(); count];
+        let mut all = vec![MeasuredScrew::default(); count];
         let mut done = 0;
-        for (at, strokes) in all.iter_mut().enumerate() {
+        for (at, measured) in all.iter_mut().enumerate() {
             for run in 1..=plan.runs {
                 for (stroke, approach) in round(&targets[at], plan) {
                     let commanded = alone(at, stroke, count);
                     self.go_to_strokes(&commanded, Correction::Off)?;
                     let Some(approach) = approach else { continue };
-                    let seen = self.camera_pose(self.config.exposures)?;
-                    sightings.push(Sighting { commanded, seen });
-                    strokes.push(self.stroke_seen(at, run, approach, stroke, seen, journal)?);
+                    let seen = self.camera_sees(self.config.exposures)?;
+                    let pose = seen.pose;
+                    sightings.push(Sighting {
+                        commanded,
+                        seen: pose,
+                    });
+                    let (seen, u) =
+                        self.stroke_seen(at, run, (stroke, approach), &seen, journal)?;
+                    measured.strokes.push(seen);
+                    measured.variances.extend(u.map(square));
                     done += 1;
                     let observer = self.core.observer();
                     observer.progress(Stage::Calibrate, "platform", done, total);
@@ -156,13 +185,16 @@ impl AlignmentPlatform<'_> {
         &self,
         at: usize,
         run: u32,
-        approach: Approach,
-        stroke: Metres,
-        seen: Pose,
+        (stroke, approach): (Metres, Approach),
+        seen: &Seen,
         journal: &mut Journal<PlatformLog>,
-    ) -> Result<Stroke, Failure> {
-        let pose = seen.since(self.state.datum.ok_or(PlatformFailure::NotZeroed)?);
-        let measured = self.state.kinematics.strokes(pose)[at];
+    ) -> Result<(Stroke, Option<Metres>), Failure> {
+        let datum = self.state.datum.ok_or(PlatformFailure::NotZeroed)?;
+        let pose = seen.pose.since(datum);
+        let kinematics = &self.state.kinematics;
+        let measured = kinematics.strokes(pose)[at];
+        let of_all = seen.covariance.as_ref();
+        let u = of_all.map(|it| kinematics.u_strokes(pose, it)[at]);
         let axis = self.state.screws[at].axis.clone();
         journal.write(&PlatformEntry::Stroke(StrokeEntry {
             axis,
@@ -170,14 +202,16 @@ impl AlignmentPlatform<'_> {
             approach: approach.symbol(),
             stroke_m: stroke.value(),
             measured_m: measured.value(),
+            measured_u_m: u.map(Metres::value),
             pose: pose.into(),
             at_s: self.core.now().seconds(),
         }))?;
-        Ok(Stroke {
+        let seen = Stroke {
             approach,
             stroke,
             deviation: measured - stroke,
-        })
+        };
+        Ok((seen, u))
     }
 
     /// The pose zero looked at again: it must still be there.
@@ -203,8 +237,9 @@ impl AlignmentPlatform<'_> {
         &self,
         at: usize,
         plan: &PlatformCalibrateConfig,
-        strokes: &[Stroke],
+        measured: &MeasuredScrew,
     ) -> Result<FittedScrew, Failure> {
+        let strokes = &measured.strokes;
         let config = self.config;
         let axis = config.actuator[at].axis.clone();
         let fitted = match plan.method {
@@ -213,6 +248,7 @@ impl AlignmentPlatform<'_> {
                     lead: Some(Metres::from_mm(config.actuator[at].lead_mm)),
                     harmonics_max: plan.harmonics_max,
                     significance: plan.significance,
+                    reading: measured.reading(),
                     ..FitOptions::default()
                 };
                 let fitted = screw::fit(strokes, &options);
@@ -262,13 +298,13 @@ impl AlignmentPlatform<'_> {
         store: &Store,
         journal: &Journal<PlatformLog>,
         plan: &PlatformCalibrateConfig,
-        strokes: &[Vec<Stroke>],
+        measured: &[MeasuredScrew],
     ) -> Result<Vec<ScrewCalibrated>, Failure> {
         let mut fitted = Vec::new();
-        for (at, strokes) in strokes.iter().enumerate() {
-            fitted.push(self.fit_screw(at, plan, strokes)?);
+        for (at, measured) in measured.iter().enumerate() {
+            fitted.push(self.fit_screw(at, plan, measured)?);
         }
-        self.store_screws(store, journal, plan, strokes, &fitted)
+        self.store_screws(store, journal, plan, measured, &fitted)
     }
 
     fn store_screws(
@@ -276,7 +312,7 @@ impl AlignmentPlatform<'_> {
         store: &Store,
         journal: &Journal<PlatformLog>,
         plan: &PlatformCalibrateConfig,
-        strokes: &[Vec<Stroke>],
+        measured: &[MeasuredScrew],
         fitted: &[FittedScrew],
     ) -> Result<Vec<ScrewCalibrated>, Failure> {
         let method = match plan.method {
@@ -298,9 +334,9 @@ impl AlignmentPlatform<'_> {
                 instrument: self.camera_record()?,
                 ..self.core.this_machine(&axis)
             };
-            let rows = u32::try_from(strokes[at].len()).unwrap_or(u32::MAX);
+            let rows = u32::try_from(measured[at].strokes.len()).unwrap_or(u32::MAX);
             let content = ScrewContent::new(model, method, rows).without(outliers);
-            let content = content.with_budget(parts.as_ref(), &strokes[at]);
+            let content = content.with_budget(parts.as_ref(), &measured[at].strokes);
             let content = content.map_err(|source| Failure::Budget {
                 axis: axis.clone(),
                 source,
@@ -313,7 +349,7 @@ impl AlignmentPlatform<'_> {
                 axis,
                 id,
                 model: model.clone(),
-                strokes: strokes[at].len(),
+                strokes: measured[at].strokes.len(),
                 outliers: outliers.clone(),
                 content,
             });

@@ -59,6 +59,10 @@ pub struct StrokeEntry {
     pub stroke_m: f64,
     /// Where the camera's pose says that it pushed the platform, metres.
     pub measured_m: f64,
+    /// Standard uncertainty of that by what pictures do not repeat, metres; `None` of a single one, and in files of earlier
+    /// programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_u_m: Option<f64>,
     /// That pose, seen from the pose zero.
     pub pose: PoseRecord,
     /// Monotonic time of the machine, seconds.

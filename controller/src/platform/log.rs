@@ -1,8 +1,8 @@
 //! Journals of a platform: each line by itself, and against those before it.
 
 use machine::records::sound::{
-    ANGLE_RAD, ERROR_M, Judged, LENGTH_M, PLACE_M, SECONDS, Unsound, approach, as_many, counted,
-    is, number, numbers, once, optional, unsound,
+    ANGLE_RAD, ERROR_M, ERROR_U_M, Judged, LENGTH_M, PLACE_M, SECONDS, Unsound, approach, as_many,
+    counted, is, number, numbers, once, optional, unsound,
 };
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
@@ -104,6 +104,7 @@ fn stroke(read: &PlatformLog, header: &JournalHeader, it: &StrokeEntry) -> Judge
         it.measured_m - it.stroke_m,
         &ERROR_M,
     )?;
+    optional("measured_u_m", it.measured_u_m, &ERROR_U_M)?;
     pose_of("pose", &it.pose)?;
     number("at_s", it.at_s, &SECONDS)
 }

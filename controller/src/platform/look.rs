@@ -7,6 +7,13 @@ use crate::failure::Failure;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 
+/// What several pictures say of a pose.
+pub(super) struct Seen {
+    pub(super) pose: Pose,
+    /// Covariance of their mean in x, y (m) and angle (rad), by what they do not repeat; `None` of a single one.
+    pub(super) covariance: Option<[[f64; 3]; 3]>,
+}
+
 impl AlignmentPlatform<'_> {
     /// Where the platform is, seen from where its screws' zeros put it.
     ///
@@ -37,8 +44,19 @@ impl AlignmentPlatform<'_> {
 
     /// Where the camera sees the platform, in the machine's frame.
     pub(super) fn camera_pose(&mut self, exposures: u32) -> Result<Pose, Failure> {
+        Ok(self.camera_sees(exposures)?.pose)
+    }
+
+    /// The same with how sure that is.
+    pub(super) fn camera_sees(&mut self, exposures: u32) -> Result<Seen, Failure> {
         let camera = self.config.camera.clone();
-        let PoseReading { x, y, angle, .. } = self.core.look(&camera, exposures)?;
-        Ok(Pose { x, y, angle })
+        let reading = self.core.look(&camera, exposures)?;
+        let PoseReading { x, y, angle, .. } = reading;
+        let pictures = f64::from(reading.samples);
+        let of_mean = || reading.covariance.map(|row| row.map(|it| it / pictures));
+        Ok(Seen {
+            pose: Pose { x, y, angle },
+            covariance: (reading.samples > 1).then(of_mean),
+        })
     }
 }

@@ -390,8 +390,8 @@ pub struct PoseReading {
     pub y: Metres,
     /// Turn, counter-clockwise.
     pub angle: Radians,
-    /// Standard deviations of the single pictures in x, y and angle, zero for a single one.
-    pub standard_deviation: (Metres, Metres, Radians),
+    /// Covariance of the single pictures in x, y and angle, m and rad; zero for a single one.
+    pub covariance: [[f64; 3]; 3],
     /// How like the taught target the worst picture was, 0 to 1.
     pub score: f64,
     /// How many pictures were averaged.

@@ -11,7 +11,8 @@ use crate::device::{DeviceError, DeviceName, PoseReading};
 pub(super) struct Measurement {
     wanted: u32,
     means: [f64; 3],
-    squares: [f64; 3],
+    /// Sums of products of what is off the mean.
+    products: [[f64; 3]; 3],
     good: u32,
     without_target: u32,
     judged_bad: u32,
@@ -26,7 +27,7 @@ impl Measurement {
         Self {
             wanted,
             means: [0.0; 3],
-            squares: [0.0; 3],
+            products: [[0.0; 3]; 3],
             good: 0,
             without_target: 0,
             judged_bad: 0,
@@ -89,24 +90,26 @@ impl Measurement {
         if self.good > 1 {
             values[2] -= Radians(values[2] - self.means[2]).whole_turns().value();
         }
-        let sums = self.means.iter_mut().zip(&mut self.squares);
-        for (value, (mean, square)) in values.into_iter().zip(sums) {
-            let step = value - *mean;
+        let steps: [f64; 3] = core::array::from_fn(|at| values[at] - self.means[at]);
+        for (mean, step) in self.means.iter_mut().zip(steps) {
             *mean += step / f64::from(self.good);
-            *square += step * (value - *mean);
+        }
+        for (row, step) in self.products.iter_mut().zip(steps) {
+            for (at, product) in row.iter_mut().enumerate() {
+                *product += step * (values[at] - self.means[at]);
+            }
         }
     }
 
     fn reading(&self, at: Time) -> PoseReading {
         let [x, y, angle] = self.means;
         let freedom = f64::from(self.good.max(2) - 1);
-        let [u_x, u_y, u_angle] = self.squares.map(|square| (square / freedom).sqrt());
         PoseReading {
             at,
             x: Metres(x),
             y: Metres(y),
             angle: Radians(angle),
-            standard_deviation: (Metres(u_x), Metres(u_y), Radians(u_angle)),
+            covariance: self.products.map(|row| row.map(|it| it / freedom)),
             score: self.worst_score,
             samples: self.good,
             rejected: self.rejected(),

@@ -3,7 +3,7 @@
 use super::*;
 use core::time::Duration;
 use proptest::prelude::*;
-use units::{Metres, Radians};
+use units::Radians;
 use wire::in_sight::Cell;
 
 const INFO: [&str; 6] = [
@@ -156,7 +156,7 @@ fn a_pose_is_fenced_triggered_and_read_in_si_units() {
     assert!((pose.angle.arcsec() - 10.0).abs() < 1e-9);
     assert_eq!((pose.samples, pose.rejected), (1, 0));
     assert!((pose.score - 0.95).abs() < 1e-12);
-    assert_eq!(pose.standard_deviation.0, Metres::ZERO);
+    assert_eq!(pose.covariance, [[0.0; 3]; 3]);
 }
 
 /// More than there are to find: whoever looks for one spot must know. A picture that was judged bad says it, too.
@@ -193,8 +193,8 @@ fn several_exposures_are_averaged_with_their_scatter() {
     let pose = bench.pose();
     assert_eq!(pose.samples, 3);
     assert!((pose.x.um() - 2.0).abs() < 1e-9);
-    let (u_x, u_y, _) = pose.standard_deviation;
-    assert!((u_x.um() - 1.0).abs() < 1e-9 && u_y == Metres::ZERO);
+    let [[of_x, ..], [_, of_y, _], _] = pose.covariance;
+    assert!((of_x - 1e-12).abs() < 1e-21 && of_y == 0.0);
     assert!((pose.score - 0.88).abs() < 1e-12, "the worst of them");
 }
 
