@@ -44,6 +44,12 @@ impl Overrides {
         Ok(overrides)
     }
 
+    /// Each bus or line that has one.
+    #[cfg(feature = "program")]
+    pub(crate) fn each(&self) -> impl Iterator<Item = (&String, &Endpoint)> {
+        self.0.iter()
+    }
+
     /// Puts `endpoint` in the place of bus or line `name`.
     pub fn set(&mut self, name: &str, endpoint: Endpoint) {
         self.0.insert(name.to_owned(), endpoint);

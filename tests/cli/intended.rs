@@ -180,7 +180,7 @@ fn a_path_is_judged_without_a_machine() {
 }
 
 /// What `truestage` says at a terminal where `answer` is typed, and its exit code.
-fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (String, Option<i32>) {
+pub(crate) fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (String, Option<i32>) {
     let terminal = openpty(None, None).expect("a terminal can be had");
     let slave = || {
         Stdio::from(

@@ -2,6 +2,7 @@
 
 mod align;
 mod alone;
+mod begin;
 mod calibrations;
 mod controls;
 mod demo;

@@ -19,6 +19,28 @@ fn text(value: &Value) -> &str {
         .unwrap_or_else(|| panic!("{value} is no text"))
 }
 
+/// What was found is who the file that is made of it expects.
+fn begins_a_file(bench: &Bench, scan: &Value) {
+    let found = scan.to_string();
+    fs::write(bench.folder().join("found.json"), found).expect("a file can be written");
+    let words = [
+        "new",
+        "new.toml",
+        "--machine",
+        "linear",
+        "--found",
+        "found.json",
+    ];
+    let made = bench.run_plainly(&words).with_code(0);
+    let left = made["to_fill_in"].to_string();
+    assert!(
+        left.contains("soft_min_mm") && !left.contains("identity"),
+        "{left}"
+    );
+    let again = bench.run(&["scan", "new.toml"]).with_code(0);
+    assert_eq!(again["matches"], true);
+}
+
 #[test]
 fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
     for rig in live_rigs() {
@@ -28,6 +50,7 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         let scan = bench.run(&["scan"]).with_code(0);
         assert_eq!(scan["matches"], true);
         assert!(scan["devices"].as_array().is_some_and(|it| it.len() >= 2));
+        begins_a_file(&bench, &scan);
 
         let zero = bench.run(&["zero"]).with_code(0);
         assert_eq!(zero["axis"], "x");

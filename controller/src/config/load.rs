@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
+use super::lines;
 use super::model::MachineConfig;
 use super::place::span_of;
 use super::schema;
@@ -27,6 +28,8 @@ pub struct Loaded {
     pub hash: ConfigHash,
     /// What is doubtful of it, in the order of the file.
     pub warnings: Vec<Diagnostic>,
+    /// What is still an example's value, marked as such by `truestage new`.
+    pub unfilled: Vec<Diagnostic>,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
     /// own pauses do not shrink, so its time-outs must bear them.
@@ -76,9 +79,26 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
     Ok(Loaded {
         hash: hash_of(&config),
         warnings: placed(text, file, warnings.map(|it| (it, Part::Value))),
+        unfilled: lines::unfilled(text, file),
         config,
         patience: Patience::NONE,
     })
+}
+
+impl Loaded {
+    /// Whether it is a machine's own throughout.
+    ///
+    /// # Errors
+    /// Names each value that is still an example's: nobody knows where that would send the axes.
+    #[cfg(feature = "program")]
+    pub(crate) fn filled_in(&self) -> Result<(), ConfigError> {
+        match self.unfilled.is_empty() {
+            true => Ok(()),
+            false => Err(ConfigError::Invalid {
+                findings: self.unfilled.clone(),
+            }),
+        }
+    }
 }
 
 /// Reads a text that is not a machine's by the declarations of `C`, and lets `judge` find what cannot be; `file` is

@@ -5,11 +5,16 @@
 
 mod axis;
 pub(crate) mod dependence;
+#[cfg(any(feature = "program", test))]
+mod described;
 mod diagnostic;
+#[cfg(feature = "program")]
+pub(crate) mod explained;
 #[cfg(test)]
 mod impossible_tests;
 pub(crate) mod judge;
 pub(crate) mod least_time;
+pub(crate) mod lines;
 mod load;
 mod model;
 #[cfg(test)]

@@ -64,6 +64,7 @@ pub struct MachineSection {
     pub name: String,
     /// Serial number of the stage; calibrations belong to it.
     #[schemars(extend("x-range" = "not empty"))]
+    #[schemars(extend("x-own" = true))]
     pub stage_serial: String,
     /// Folder of calibrations, journals and reports, from this file's folder.
     pub data_dir: PathBuf,

@@ -7,6 +7,7 @@ use toml::{Table, Value};
 use units::Short;
 
 use super::judge::Finding;
+use super::lines::below;
 use super::schema::{DEVICE, type_of, without_null};
 use super::unit::{is_unit, split_unit};
 
@@ -39,13 +40,6 @@ fn say(findings: &mut Findings, key: &str, cause: String, help: String) {
 fn say_size(findings: &mut Findings, key: &str, seen: f64, help: String) {
     let (key, cause) = (key.to_owned(), format!("{} is impossible", Short(seen)));
     findings.push((Finding { key, cause, help }, Part::Size));
-}
-
-fn below(path: &str, key: &str) -> String {
-    match path.is_empty() {
-        true => key.to_owned(),
-        false => format!("{path}.{key}"),
-    }
 }
 
 fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {

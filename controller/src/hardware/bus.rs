@@ -34,9 +34,11 @@ pub struct CanBus {
     pub transport: CanTransport,
     /// Interface name, such as `"can0"`.
     #[schemars(extend("x-range" = "with `socketcan`, only then"))]
+    #[schemars(extend("x-own" = true))]
     pub interface: Option<String>,
     /// The adapter's serial device; opened at 115200 baud.
     #[schemars(extend("x-range" = "with `slcan`, only then"))]
+    #[schemars(extend("x-own" = true))]
     pub path: Option<PathBuf>,
     /// Bit rate. An SLCAN adapter is set to it; a kernel interface is set by `ip link`, here it
     /// counts for the bus load only.
@@ -61,6 +63,7 @@ pub struct CanBus {
 #[serde(deny_unknown_fields)]
 pub struct SerialLine {
     /// The device; `/dev/serial/by-id/...` survives replugging.
+    #[schemars(extend("x-own" = true))]
     pub path: PathBuf,
     /// Baud rate.
     #[schemars(range(min = 50, max = 4000000))]

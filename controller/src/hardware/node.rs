@@ -20,14 +20,19 @@ use crate::config::judge::Judge;
 #[serde(deny_unknown_fields)]
 pub struct IdentityConfig {
     /// 0x1000.
+    #[schemars(extend("x-own" = true))]
     pub device_type: u32,
     /// 0x1018:01.
+    #[schemars(extend("x-own" = true))]
     pub vendor_id: u32,
     /// 0x1018:02.
+    #[schemars(extend("x-own" = true))]
     pub product_code: u32,
     /// 0x1018:03.
+    #[schemars(extend("x-own" = true))]
     pub revision: Option<u32>,
     /// 0x1018:04.
+    #[schemars(extend("x-own" = true))]
     pub serial_number: Option<u32>,
 }
 
@@ -53,6 +58,7 @@ pub struct NodeConfig {
     pub bus: String,
     /// Its number there; no two nodes of a bus have the same.
     #[schemars(range(min = 1, max = 127))]
+    #[schemars(extend("x-own" = true))]
     pub node_id: u8,
     /// Period of its heartbeat (0x1017).
     #[schemars(range(min = 5, max = 10000))]

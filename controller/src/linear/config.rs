@@ -18,9 +18,11 @@ pub struct ZeroConfig {
     #[schemars(extend("x-range" = "an `[analog.NAME]` with two channels"))]
     pub analog: String,
     /// Nominal coordinate of the negative limit switch.
+    #[schemars(extend("x-own" = true))]
     pub negative_limit_mm: f64,
     /// Speed of the coarse reference; its last part runs at a fifth.
     #[schemars(range(min = 0.001, max = 1000.0))]
+    #[schemars(extend("x-own" = true))]
     pub reference_speed_mm_per_s: f64,
     /// Speed of the Hall search.
     #[schemars(range(min = 0.001, max = 100.0))]

@@ -76,15 +76,19 @@ pub struct ActuatorConfig {
     #[schemars(extend("x-range" = "an `[axis.NAME]`"))]
     pub axis: String,
     /// The point it pushes, in the platform's frame, at pose zero.
+    #[schemars(extend("x-own" = true))]
     pub point_mm: [f64; 2],
     /// Which way it pushes; the length does not matter.
     #[schemars(extend("x-range" = "not both 0"))]
+    #[schemars(extend("x-own" = true))]
     pub direction: [f64; 2],
     /// Travel per turn: the period of its periodic error.
     #[schemars(range(min = 0.001, max = 1000.0))]
+    #[schemars(extend("x-own" = true))]
     pub lead_mm: f64,
     /// The coordinate of the first index pulse off the negative limit switch.
     #[schemars(range(min = -10000.0, max = 10000.0), extend("x-range" = "below `soft_max_mm`"))]
+    #[schemars(extend("x-own" = true))]
     pub index_mm: f64,
     /// Strokes of its own for `calibrate`, in place of those of all.
     pub strokes: Option<StrokesConfig>,

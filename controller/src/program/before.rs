@@ -20,6 +20,7 @@ pub(crate) fn run(intent: Intent<'_>, output: Output) -> Ended {
     let ended = by_kind(intent.machine(), intent.named().into_iter(), |kind| {
         (kind.refuse)(intent)?;
         let loaded = config::load(&intent.machine().config)?;
+        loaded.filled_in()?;
         let steps = steps(kind, &loaded, intent)?;
         let ask = intent.ask();
         if ask.dry_run {

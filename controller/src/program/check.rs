@@ -24,7 +24,7 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
         Several(loaded.config.camera.len(), "camera"),
         &loaded.hash.as_str()[..12],
     );
-    let warnings = loaded.warnings.iter();
+    let warnings = loaded.warnings.iter().chain(&loaded.unfilled);
     let text = warnings.fold(text, |text, it| format!("{text}\nwarning: {it}"));
     let notes = KINDS.iter().flat_map(|it| (it.notes)(&loaded.config));
     let notes: Vec<_> = notes.collect();
@@ -32,7 +32,7 @@ pub(crate) fn run(path: &Path, output: Output) -> Ended {
     output.result(
         &text,
         &json!({"ok": true, "machine": machine.name, "hash": loaded.hash.as_str(), "notes": notes,
-                "warnings": loaded.warnings}),
+                "warnings": loaded.warnings, "unfilled": loaded.unfilled}),
     )
 }
 

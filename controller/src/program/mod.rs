@@ -24,6 +24,7 @@ mod kind;
 mod linear;
 mod made_from;
 mod monitor;
+mod new;
 mod operator;
 mod output;
 mod page;
@@ -90,6 +91,9 @@ enum Command {
         #[arg(default_value = "machine.toml")]
         config: PathBuf,
     },
+    /// Write a configuration to begin with: a machine that ships, each key explained, with what is told here, asked at a
+    /// terminal, or was found by `scan`. What must still be filled in is marked.
+    New(new::NewArgs),
     /// Check what stands between this computer and the machine: ports, rights, queues, records, other masters on a
     /// bus; a line for each, with what to do. Nothing is sent to any device.
     Doctor(MachineArgs),
@@ -430,6 +434,7 @@ pub fn main(
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args, output),
         Command::Check { config } => check::run(&config, output),
+        Command::New(args) => new::run(&args, output),
         Command::Doctor(args) => doctor::run(&args, output),
         Command::Scan(args) => scan::run(&args, output),
         Command::Reset(args) => reset::run(&args, output),

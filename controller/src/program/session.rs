@@ -17,6 +17,9 @@ use crate::{Failure, Machine, assemble};
 use machine::StopRequest;
 use machine::records::Store;
 
+/// Verbs by which nothing moves, whatever the configuration says.
+const STILL: [&str; 3] = ["align", "reset", "scan"];
+
 /// A machine that is connected and leased to this process.
 pub(crate) struct Session {
     pub(crate) machine: Machine,
@@ -34,6 +37,9 @@ impl Session {
         output: Output,
     ) -> Result<Self, Failure> {
         let mut loaded = config::load(&args.config)?;
+        if !STILL.contains(&verb) {
+            loaded.filled_in()?;
+        }
         let overrides = Overrides::parse(&args.ports, &loaded.config)?;
         if let Some(path) = &args.record {
             refuse_existing(path)?;

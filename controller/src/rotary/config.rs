@@ -64,6 +64,7 @@ pub struct RotaryConfig {
     pub node: NodeConfig,
     /// Position units of the drive in one turn: exactly a whole number.
     #[schemars(range(min = 360, max = 2147483647))]
+    #[schemars(extend("x-own" = true))]
     pub counts_per_turn: u32,
     /// `true` when the drive counts against the table.
     #[serde(default)]
@@ -77,15 +78,19 @@ pub struct RotaryConfig {
     pub position_range: PositionRangeName,
     /// Speed of ordinary moves and of sweeps over a plate.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
+    #[schemars(extend("x-own" = true))]
     pub speed_deg_per_s: f64,
     /// Fastest possible: faster moves are refused, faster changes of position not believed.
     #[schemars(range(min = 0.001, max = 100000.0))]
+    #[schemars(extend("x-own" = true))]
     pub speed_max_deg_per_s: f64,
     /// Of moves and of the search of the index mark.
     #[schemars(range(min = 0.01, max = 1000000.0))]
+    #[schemars(extend("x-own" = true))]
     pub acceleration_deg_per_s2: f64,
     /// 0x6085.
     #[schemars(range(min = 0.01, max = 1000000.0))]
+    #[schemars(extend("x-own" = true))]
     pub quick_stop_deceleration_deg_per_s2: f64,
     /// Following error window (0x6065).
     #[schemars(range(min = 0.001, max = 1000000.0))]
@@ -242,9 +247,11 @@ pub struct RotaryCalibrateConfig {
     /// Serial number of the plate: a run is continued, and a calibration verified, with the same
     /// one.
     #[schemars(extend("x-range" = "not empty"))]
+    #[schemars(extend("x-own" = true))]
     pub plate: String,
     /// Its lines.
     #[schemars(range(min = 12, max = 100000))]
+    #[schemars(extend("x-own" = true))]
     pub lines: u32,
     /// By how many lines it is turned in each placement, against the first.
     #[schemars(extend("x-range" = "each once, below `lines`; or `placements`"))]

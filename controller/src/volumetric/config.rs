@@ -31,14 +31,18 @@ pub struct VolumetricConfig {
     /// Which slide stands on which, from the workpiece to the tool; F is the foundation. `"FXYZ"`:
     /// the tool does everything; `"XFYZ"`: x carries the workpiece.
     #[schemars(extend("x-range" = "each of X, Y, Z, F once"))]
+    #[schemars(extend("x-own" = true))]
     pub chain: String,
     /// The lowest corner of the work volume.
     #[schemars(extend("x-range" = "below `high_mm`; with `size_limit_um` within the soft limits"))]
+    #[schemars(extend("x-own" = true))]
     pub low_mm: [f64; 3],
     /// The highest corner.
+    #[schemars(extend("x-own" = true))]
     pub high_mm: [f64; 3],
     /// From the machine's zero to the tool point with all axes at 0.
     #[schemars(extend("x-range" = "up to `tool_max_mm`"))]
+    #[schemars(extend("x-own" = true))]
     pub tool_offset_mm: [f64; 3],
     /// Longest component of any tool: the correction is proven for tools up to it.
     #[schemars(range(min = 0.0, max = 10000.0))]
@@ -107,6 +111,7 @@ pub enum VolumeAxisName {
 pub struct VolumetricZeroConfig {
     /// One after the other; that which clears the workpiece first.
     #[schemars(extend("x-range" = "each once"))]
+    #[schemars(extend("x-own" = true))]
     pub order: [VolumeAxisName; 3],
     /// How fast the limit switch is sought.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_mm_per_s` of each axis"))]
@@ -116,6 +121,7 @@ pub struct VolumetricZeroConfig {
     pub time_limit_s: f64,
     /// The coordinates of these pulses; the axes are left there.
     #[schemars(extend("x-range" = "within the soft limits"))]
+    #[schemars(extend("x-own" = true))]
     pub index_mm: [f64; 3],
 }
 

@@ -17,14 +17,17 @@ use crate::hardware::CHECKED;
 pub struct InSightConfig {
     /// The job that must be active; each pose begins by asking for it.
     #[schemars(extend("x-range" = "ends in `.job` or `.jobx`"))]
+    #[schemars(extend("x-own" = true))]
     pub job: String,
     /// What it must call itself.
     pub serial_number: Option<String>,
     /// The cell of text in which the job puts `count,found,judgement,x,y,angle,score`.
     #[schemars(extend("x-range" = "a letter and a row, `\"A0\"` to `\"Z399\"`"))]
+    #[schemars(extend("x-own" = true))]
     pub result_cell: String,
     /// One unit of the job's x and y.
     #[schemars(range(min = 1e-06, max = 1000000.0))]
+    #[schemars(extend("x-own" = true))]
     pub length_um_per_unit: f64,
     /// One unit of the job's angle; 3600 for degrees.
     #[schemars(range(min = 1e-06, max = 1000000.0))]
@@ -32,6 +35,7 @@ pub struct InSightConfig {
     /// The cameras' x axis against the machine's, counter-clockwise.
     #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0))]
+    #[schemars(extend("x-own" = true))]
     pub rotation_deg: f64,
     /// The cameras' y axis goes the other way, as when they look from below; their angles then do,
     /// too.

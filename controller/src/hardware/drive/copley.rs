@@ -27,6 +27,7 @@ pub struct CopleyAxisConfig {
     pub line: String,
     /// 0: the amplifier at the cable; others: its node number on the CAN behind that one.
     #[schemars(range(min = 0, max = 127))]
+    #[schemars(extend("x-own" = true))]
     pub address: u8,
     /// From one look at status and position to the next. A look is three exchanges of some 3 ms at
     /// 115200 bit/s and 17 ms at 9600; what the line cannot carry comes later.
@@ -43,6 +44,7 @@ pub struct AmplifierConfig {
     /// What it must call itself (parameter 0x80); any without it.
     pub model: Option<String>,
     /// The serial number that it must have (parameter 0x81); any without it.
+    #[schemars(extend("x-own" = true))]
     pub serial_number: Option<u32>,
 }
 

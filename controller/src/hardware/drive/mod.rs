@@ -88,23 +88,30 @@ pub struct MotionConfig {
     /// One encoder count; negative when the drive counts against the axis. The soft limits must fit
     /// 31 bits of counts.
     #[schemars(extend("x-magnitude" = [0.01, 1e6]))]
+    #[schemars(extend("x-own" = true))]
     pub resolution_nm: f64,
     /// Soft limit; also written to the drive (0x607D), to an amplifier after homing (0xb8).
     #[schemars(extend("x-range" = "below `soft_max_mm`"))]
+    #[schemars(extend("x-own" = true))]
     pub soft_min_mm: f64,
     /// Likewise (0xb9).
+    #[schemars(extend("x-own" = true))]
     pub soft_max_mm: f64,
     /// Speed of ordinary moves.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_mm_per_s`"))]
+    #[schemars(extend("x-own" = true))]
     pub speed_mm_per_s: f64,
     /// Fastest possible: faster moves are refused, faster changes of position not believed.
     #[schemars(range(min = 0.001, max = 100000.0))]
+    #[schemars(extend("x-own" = true))]
     pub speed_max_mm_per_s: f64,
     /// Acceleration and deceleration of moves.
     #[schemars(range(min = 0.01, max = 1000000.0))]
+    #[schemars(extend("x-own" = true))]
     pub acceleration_mm_per_s2: f64,
     /// Written to the drive (0x6085; 0xcf).
     #[schemars(range(min = 0.01, max = 10000000.0))]
+    #[schemars(extend("x-own" = true))]
     pub quick_stop_deceleration_mm_per_s2: f64,
     /// Following error window (0x6065; 0xba).
     #[schemars(range(min = 0.001, max = 100000.0))]

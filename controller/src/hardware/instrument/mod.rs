@@ -111,6 +111,7 @@ pub struct InstrumentConfig {
     pub line: String,
     /// `true` when the instrument counts down while the axis moves forward, as when the path of a beam
     /// shortens.
+    #[schemars(extend("x-own" = true))]
     pub reverse: bool,
     /// Whether readings are corrected for the angle between measuring line and travel.
     pub correct_cosine: bool,

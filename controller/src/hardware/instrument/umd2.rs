@@ -20,6 +20,7 @@ pub struct Umd2Config {
     /// How often the beam passes the measured length there and back: one count is λ/2 divided by
     /// it. 1 linear (corner cube), 2 plane mirror.
     #[schemars(range(min = 1, max = 16))]
+    #[schemars(extend("x-own" = true))]
     pub optics_factor: u8,
     /// The firmware's rate.
     #[schemars(range(min = 1.0, max = 100000.0))]
@@ -31,11 +32,13 @@ pub struct Umd2Config {
     pub correct_material: bool,
     /// Of the machine's material.
     #[schemars(range(min = -0.0001, max = 0.0001))]
+    #[schemars(extend("x-own" = true))]
     pub expansion_per_kelvin: f64,
     /// Whether for the dead path; needs `correct_air`.
     pub correct_dead_path: bool,
     /// Path in air between optic and reflector at the axis's zero.
     #[schemars(range(min = 0.0, max = 100000.0))]
+    #[schemars(extend("x-own" = true))]
     pub dead_path_mm: f64,
     /// A sensor of air or material that shows the very same digits for longer is broken, and stops
     /// the run.

@@ -7,7 +7,7 @@
 
 pub(crate) mod emulation;
 pub(crate) mod stand;
-mod which;
+pub(crate) mod which;
 
 use std::io::IsTerminal;
 use std::time::Instant;

@@ -47,9 +47,11 @@ pub struct BeamConfig {
     /// Where the source is, by the axis's scale. With both ends of the beam readings that contradict each
     /// other are also tried with another `drift`.
     #[schemars(extend("x-range" = "needed unless `translating`; with `end_mm`"))]
+    #[schemars(extend("x-own" = true))]
     pub source_mm: Option<f64>,
     /// Where the end detector is, by the axis's scale.
     #[schemars(extend("x-range" = "needed unless `translating`; elsewhere than the source"))]
+    #[schemars(extend("x-own" = true))]
     pub end_mm: Option<f64>,
     /// The share of the shift at the end that is sideways as a whole.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-range" = "with `mixed`, only then"))]
@@ -162,6 +164,7 @@ pub struct BeamDetectorConfig {
     /// detectors and thermometers know of). Calibrations made with another place are refused as
     /// foreign.
     #[serde(default)]
+    #[schemars(extend("x-own" = true))]
     pub place_mm: [f64; 3],
     /// Which of these the channels are.
     pub layout: LayoutName,
@@ -176,6 +179,7 @@ pub struct BeamDetectorConfig {
     /// Place = this × ratio of the channels (difference by sum), for the first and second
     /// direction.
     #[schemars(extend("x-range" = "with `ratio_max`, or a `curve`"))]
+    #[schemars(extend("x-own" = true))]
     pub um_per_one: Option<[f64; 2]>,
     /// Up to which ratio that is used.
     #[schemars(extend("x-range" = "with `um_per_one`"))]
@@ -275,11 +279,14 @@ pub struct RollConfig {
     pub channels: [u8; 2],
     /// From volts to the readings x₁ and x₂.
     #[schemars(extend("x-magnitude" = [1e-9, 1e3]))]
+    #[schemars(extend("x-own" = true))]
     pub mm_per_v: [f64; 2],
     /// H of the optics.
     #[schemars(extend("x-range" = "together they must determine the roll"))]
+    #[schemars(extend("x-own" = true))]
     pub height_mm: f64,
     /// L of the optics.
+    #[schemars(extend("x-own" = true))]
     pub base_mm: f64,
     /// Φ of the optics.
     pub inclination_deg: f64,
