@@ -25,6 +25,7 @@ mod serve;
 mod serve_kinds;
 mod soak;
 mod table;
+mod tutorial;
 mod verbs;
 mod volumetric;
 mod volumetric_live;

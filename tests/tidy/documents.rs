@@ -20,6 +20,7 @@ const DOCUMENTS: &[&str] = &[
     "docs/safety.md",
     "docs/seeds.md",
     "docs/service.md",
+    "docs/tutorial.md",
     "tests/README.md",
 ];
 
