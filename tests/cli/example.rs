@@ -30,15 +30,7 @@ fn measured() -> String {
 }
 
 /// From 10 mm to 40 mm and back in four seconds.
-fn path() -> String {
-    let mut rows = "time_s,x_mm\n".to_owned();
-    for at in 0..=40 {
-        let time_s = 0.1 * f64::from(at);
-        let x_mm = 25.0 - 15.0 * (core::f64::consts::FRAC_PI_2 * time_s).cos();
-        writeln!(rows, "{time_s:.1},{x_mm:.6}").expect("a text takes everything");
-    }
-    rows
-}
+const PATH: &str = include_str!("../../configs/data/path-x.csv");
 
 /// With its axis cyclic, and its bus where this machine has it.
 fn streaming(bench: &Bench, text: &str, period_ms: &str) -> String {
@@ -85,7 +77,7 @@ fn prepared(rig: Rig, period_ms: &str) -> Bench {
         fs::write(bench.folder().join(name), text).expect("a file can be written");
     };
     file("data.csv", measured());
-    file("path.csv", path());
+    file("path.csv", PATH.to_owned());
     let fit = ["fit", "linear", "data.csv", "--save", "machine.toml"];
     let saved = bench.run_plainly(&fit).with_code(0);
     let id = saved["calibration"].as_str().expect("its name");

@@ -20,6 +20,7 @@ mod network;
 mod platform;
 mod programs;
 mod rotary;
+mod samples;
 mod screw;
 mod serve;
 mod serve_kinds;
