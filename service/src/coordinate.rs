@@ -1,5 +1,6 @@
 //! Where axes are: along a way or round a turn.
 
+use truestage::runs::Place;
 use units::{Metres, Radians};
 
 /// A place of an axis: a length, or an angle of one that turns. As it goes in: `"12.5mm"`, `"90deg"`,
@@ -21,5 +22,14 @@ impl From<Metres> for Coordinate {
 impl From<Radians> for Coordinate {
     fn from(angle: Radians) -> Self {
         Self::Angle(angle)
+    }
+}
+
+impl From<Place> for Coordinate {
+    fn from(place: Place) -> Self {
+        match place {
+            Place::Length(it) => Self::Length(it),
+            Place::Angle(it) => Self::Angle(it),
+        }
     }
 }

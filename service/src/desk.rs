@@ -316,6 +316,7 @@ fn unended(asked: &Asked, is_of_earlier_boot: bool) -> MotionView {
         stopped: None,
         cause,
         axes: std::collections::BTreeMap::new(),
+        told: None,
     }
 }
 

@@ -34,6 +34,8 @@ pub enum Code {
     SoftLimit,
     /// A target that the calibration does not cover, or a calibration that cannot be used.
     Calibration,
+    /// Not done for safety, as the cause says: a pose out of reach, a path that cannot be driven.
+    Refused,
     /// The machine was stopped by a failure and waits for a reset.
     ErrorStop,
     /// Somebody else has the lease.
@@ -103,6 +105,7 @@ impl Code {
             Self::TooLarge => 413,
             Self::SoftLimit
             | Self::Calibration
+            | Self::Refused
             | Self::KeyReused
             | Self::NotOffered
             | Self::Configuration
@@ -138,6 +141,7 @@ impl Code {
             | Self::NotZeroed
             | Self::SoftLimit
             | Self::Calibration
+            | Self::Refused
             | Self::ErrorStop
             | Self::Leased
             | Self::Unauthorized
@@ -300,6 +304,7 @@ pub(crate) fn code_of(failure: &Failure) -> Code {
         Failure::File { .. } => Code::Storage,
         other => match other.exit_code() {
             2 => Code::Configuration,
+            3 => Code::Refused,
             5 => Code::OutOfTolerance,
             _ => Code::Device,
         },

@@ -38,7 +38,8 @@ pub type Target = BTreeMap<String, Coordinate>;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoveRequest {
-    /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time.
+    /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time; those
+    /// of a platform (x, y, theta) and of three axes that are corrected together move as one.
     #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
     /// How fast each may be at most; the usual speed of its configuration when left out. For axes along a way.
@@ -51,8 +52,8 @@ pub struct MoveRequest {
     /// What happens when one of the axes is in use.
     #[serde(default)]
     pub if_moving: IfMoving,
-    /// `true`: the axes go by their encoders alone. Without it those that have no calibration are refused, and those
-    /// whose errors are corrected only together.
+    /// `true`: the axes go by their encoders alone, also those that are corrected only together. Without it those that
+    /// have no calibration are refused.
     // Motions that were written down before it had this name are still read.
     #[serde(default, alias = "uncorrected")]
     pub uncompensated: bool,
@@ -60,6 +61,9 @@ pub struct MoveRequest {
     /// refused.
     #[serde(default)]
     pub beyond: bool,
+    /// `true`: a platform goes on moving until its camera sees it at the target.
+    #[serde(default)]
+    pub align: bool,
     /// A dead-man: the motion stops unless it is renewed within this time, again and again, in milliseconds.
     #[serde(
         default,
@@ -80,6 +84,7 @@ impl MoveRequest {
             if_moving: IfMoving::default(),
             uncompensated: false,
             beyond: false,
+            align: false,
             dead_man_ms: None,
         }
     }

@@ -8,7 +8,8 @@ use crate::coordinate::Coordinate;
 use crate::figures::Figures;
 use crate::quantity::Quantity;
 use crate::view::{
-    AxisState, AxisView, Cause, Event, LeaseView, MachineState, MachineView, MotionView, RunView,
+    AxisState, AxisView, Cause, Event, GroupView, LeaseView, MachineState, MachineView, MotionView,
+    RunView,
 };
 
 /// What never changes of a machine.
@@ -20,6 +21,8 @@ pub(crate) struct Fixed {
     /// When the service began, UTC, RFC 3339.
     pub(crate) started: String,
     pub(crate) axes: Vec<FixedAxis>,
+    /// Axes that can move as one.
+    pub(crate) groups: Vec<GroupView>,
 }
 
 /// What never changes of an axis.
@@ -114,6 +117,7 @@ impl Snapshot {
             cause: self.cause.as_deref().cloned(),
             clock_s: self.now.seconds(),
             lease: self.lease_view(),
+            groups: fixed.groups.clone(),
             newest_event: self.newest_event(),
         }
     }

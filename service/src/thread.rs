@@ -1,5 +1,7 @@
 //! The machine's thread: it makes the machine, ticks for ever, and runs procedures between two ticks.
 
+mod together;
+
 use core::time::Duration;
 use std::any::Any;
 use std::cell::RefCell;
@@ -216,6 +218,7 @@ impl Kept {
             match job {
                 None => {}
                 Some(Job::Run(id)) => self.run(&id),
+                Some(Job::Move(id)) => self.move_as_one(&id),
                 Some(Job::Choose(choice, by, reply)) => {
                     let chosen = self.choose(&choice, &by);
                     answer(reply, chosen);
@@ -326,6 +329,11 @@ impl Kept {
     fn load_courses(&mut self) {
         let groups = self.keeper.borrow().groups();
         for group in groups {
+            if !group.parts.is_empty() {
+                let judge = group.judge(&mut self.machine, &self.store);
+                let mut keeper = self.keeper.borrow_mut();
+                keeper.set_judge(&group.name, judge.map_err(Problem::from));
+            }
             let (in_use, warning) = match group.load(&mut self.machine, &self.store) {
                 Ok(in_use) => (in_use, None),
                 Err(failure) => (Vec::new(), Some(failure)),

@@ -124,8 +124,22 @@ pub struct MachineView {
     pub clock_s: f64,
     /// Who may command, when not everybody.
     pub lease: Option<LeaseView>,
+    /// Axes that can move as one.
+    #[serde(default)]
+    pub groups: Vec<GroupView>,
     /// The number of the newest event.
     pub newest_event: u64,
+}
+
+/// Axes that can move as one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct GroupView {
+    /// What they are called together: `platform` or `volume`.
+    pub name: String,
+    /// Its axes.
+    pub axes: Vec<String>,
+    /// What a motion of them names as targets: the axes, or the parts of a pose.
+    pub targets: Vec<String>,
 }
 
 /// Who may command.
@@ -193,8 +207,11 @@ pub struct MotionView {
     pub stopped: Option<Stopped>,
     /// Why it failed, when it did.
     pub cause: Option<Cause>,
-    /// Each axis.
+    /// Each axis; of a platform, each part of its pose.
     pub axes: BTreeMap<String, LegView>,
+    /// How axes that have moved as one ended, as the command line prints it, when it is done.
+    #[serde(default)]
+    pub told: Option<ToldView>,
 }
 
 /// What one axis does in a motion.

@@ -65,15 +65,12 @@ fn a_kept_table_is_calibrated_by_the_hand_that_its_client_lends() {
 #[test]
 fn a_kept_platform_says_what_it_says_without_a_service() {
     let short = |text: String| text.edit("poses = 20", "poses = 4");
-    let verbs: [&[&str]; 3] = [
+    let verbs: [&[&str]; 4] = [
         &["zero", "machine.toml"],
         &["calibrate", "machine.toml"],
         &["verify", "machine.toml"],
+        &["move", "machine.toml", "x=1mm", "theta=20arcsec"],
     ];
-    let refused: [&[&str]; 2] = [
-        &["zero", "machine.toml", "--axis", "u"],
-        // Not yet.
-        &["move", "machine.toml", "x=1mm"],
-    ];
+    let refused: [&[&str]; 1] = [&["zero", "machine.toml", "--axis", "u"]];
     check(UVW, short, &verbs, &refused);
 }

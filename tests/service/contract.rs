@@ -9,6 +9,7 @@ mod paused;
 pub(crate) mod questions;
 mod repeated;
 mod runs;
+mod together;
 mod turns;
 
 use core::time::Duration;
@@ -57,6 +58,13 @@ fn each(new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
     each_of(meetings(), new, body);
 }
 
+/// Where the machine is in this process: three axes that follow a set-point every 2 ms take minutes elsewhere.
+fn each_here(new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
+    let mut meetings = meetings();
+    meetings.retain(|it| it.0 == Rig::InProcess);
+    each_of(meetings, new, body);
+}
+
 fn each_of(meetings: Vec<(Rig, Meet)>, new: impl Fn(Rig, &Path) -> Stage, body: impl Fn(&Bed<'_>)) {
     for (rig, meet) in meetings {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -82,9 +90,7 @@ fn with_zeroed_stage(body: impl Fn(&Bed<'_>)) {
 
 /// The same where no bus is: for what is told alike on any.
 fn with_zeroed_stage_in_process(body: impl Fn(&Bed<'_>)) {
-    let mut meetings = meetings();
-    meetings.retain(|it| it.0 == Rig::InProcess);
-    each_of(meetings, linear, |bed| {
+    each_here(linear, |bed| {
         bed.client.zero(&anna(), None);
         body(bed);
     });

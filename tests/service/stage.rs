@@ -303,8 +303,7 @@ impl Stage {
     /// Something goes wrong from now on.
     pub(crate) fn inject(&self, fault: Fault) -> FaultId {
         self.simulation(|simulation| {
-            let mut fault = FaultConfig::permanent(fault);
-            fault.from_s = simulation.now().seconds();
+            let fault = FaultConfig::permanent(fault);
             simulation.inject(fault).expect("a fault of this machine")
         })
     }

@@ -3,6 +3,7 @@
 mod frame;
 
 use core::time::Duration;
+use std::path::Path;
 
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
@@ -211,9 +212,17 @@ impl Volume {
     /// # Panics
     /// When files cannot be copied.
     pub fn inherit(&self, other: &Self) {
+        other.bequeath(self.bench.store.root());
+    }
+
+    /// Copies what it has stored to the store at `root`.
+    ///
+    /// # Panics
+    /// When files cannot be copied.
+    pub fn bequeath(&self, root: &Path) {
         for folder in ["calibrations", "active"] {
-            let from = other.bench.store.root().join(folder);
-            let to = self.bench.store.root().join(folder);
+            let from = self.bench.store.root().join(folder);
+            let to = root.join(folder);
             std::fs::create_dir_all(&to).expect("there is room");
             for file in std::fs::read_dir(from).expect("it is there") {
                 let file = file.expect("it is there");

@@ -19,6 +19,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    moves: None,
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {

@@ -6,6 +6,18 @@ use drivers::device::PoseReading;
 use crate::failure::Failure;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::zero::DATUM_LOOKS;
+use units::portable::hypot;
+use units::{Metres, Radians};
+
+/// Where the camera sees a platform, and how uncertain that is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SeenPose {
+    /// In the machine's frame.
+    pub(super) pose: Pose,
+    /// The standard uncertainty of each part, counted from the zero; `None` where a single picture does not tell it.
+    pub(super) uncertainty: Option<Pose>,
+}
 
 /// What several pictures say of a pose.
 pub(super) struct Seen {
@@ -47,7 +59,7 @@ impl AlignmentPlatform<'_> {
         Ok(self.camera_sees(exposures)?.pose)
     }
 
-    /// The same with how sure that is.
+    /// The same, with what its pictures do not repeat.
     pub(super) fn camera_sees(&mut self, exposures: u32) -> Result<Seen, Failure> {
         let camera = self.config.camera.clone();
         let reading = self.core.look(&camera, exposures)?;
@@ -58,5 +70,27 @@ impl AlignmentPlatform<'_> {
             pose: Pose { x, y, angle },
             covariance: (reading.samples > 1).then(of_mean),
         })
+    }
+
+    /// The same, with how uncertain it is: by the camera's own scale and teaching, and by what the pictures scatter,
+    /// also those of the zero.
+    pub(super) fn look_closely(&mut self) -> Result<SeenPose, Failure> {
+        let Seen { pose, covariance } = self.camera_sees(self.config.exposures)?;
+        let own = &self.core.config.camera[&self.config.camera];
+        let own = [
+            own.standard_uncertainty_um * 1e-6,
+            own.standard_uncertainty_um * 1e-6,
+            Radians::from_arcsec(own.standard_uncertainty_arcsec).value(),
+        ];
+        let share = 1.0 + 1.0 / f64::from(DATUM_LOOKS);
+        let uncertainty = covariance.map(|of_mean| {
+            let u = |at: usize| hypot(own[at], (of_mean[at][at] * share).sqrt());
+            Pose {
+                x: Metres(u(0)),
+                y: Metres(u(1)),
+                angle: Radians(u(2)),
+            }
+        });
+        Ok(SeenPose { pose, uncertainty })
     }
 }

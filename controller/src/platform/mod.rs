@@ -21,12 +21,15 @@ mod header;
 mod kind;
 mod log;
 mod look;
+mod motion;
 pub(crate) mod moves;
 pub(crate) mod record;
 mod runs;
 mod sound;
 pub(crate) mod state;
 mod take_up;
+mod target;
+mod together;
 mod told;
 pub(crate) mod verify;
 mod warnings;
@@ -48,7 +51,11 @@ pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
 pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
 #[cfg(feature = "program")]
+pub(crate) use motion::{PlatformMoved, PoseAsked};
+#[cfg(feature = "program")]
 pub(crate) use moves::PoseMoved;
 pub(crate) use record::ScrewMethodName;
 pub(crate) use runs::RUNS;
 pub(crate) use state::kinematics;
+#[cfg(feature = "program")]
+pub(crate) use target::NamedPose;

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use compensator::platform::Pose;
+use compensator::platform::{Platform, Pose};
 use compensator::screw::ScrewMemory;
 use drivers::device::AxisCommand;
 use units::{Metres, MetresPerSecond, MetresPerSecondSquared};
@@ -58,8 +58,7 @@ impl AlignmentPlatform<'_> {
     /// # Errors
     /// When it may not.
     pub fn check_pose(&self, target: Pose) -> Result<(), Failure> {
-        check_work_range(self.config, target)?;
-        self.strokes_to(target).map(drop)
+        check_pose_of((self.config, &self.state.kinematics), target)
     }
 
     fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
@@ -73,11 +72,26 @@ impl AlignmentPlatform<'_> {
     /// Before anything moves: not zeroed, outside the work range, a screw's reach or
     /// calibration, or a way there that leaves them. While moving: whatever stops the machine.
     pub fn move_to(&mut self, target: Pose) -> Result<PoseMoved, Failure> {
+        self.move_by(target, Correction::On)
+    }
+
+    /// The same with the screws' calibrations or without them.
+    pub(super) fn move_by(
+        &mut self,
+        target: Pose,
+        correction: Correction,
+    ) -> Result<PoseMoved, Failure> {
         self.require_zeroed()?;
         self.check_pose(target)?;
-        self.plan(&self.strokes_to(target)?, Correction::On)?;
+        self.plan(&self.strokes_to(target)?, correction)?;
+        if correction == Correction::Off {
+            let mut moved = self.go_to_pose(target, correction)?;
+            // What is known of the screws is not made use of.
+            moved.uncertainties.fill(None);
+            return Ok(moved);
+        }
         let taken_up = self.take_up()?;
-        let moved = self.go_to_pose(target, Correction::On)?;
+        let moved = self.go_to_pose(target, correction)?;
         Ok(PoseMoved { taken_up, ..moved })
     }
 
@@ -307,6 +321,16 @@ impl AlignmentPlatform<'_> {
 
 /// More lost motion than a screw of a precision platform has.
 const LOST_MOTION_MAX: Metres = Metres(50e-6);
+
+/// Whether a platform may be told to be at `target`: by its work range and its screws' reach.
+pub(super) fn check_pose_of(
+    (config, kinematics): (&PlatformConfig, &Platform),
+    target: Pose,
+) -> Result<(), Failure> {
+    check_work_range(config, target)?;
+    let strokes = kinematics.check(target);
+    Ok(strokes.map(drop).map_err(PlatformFailure::from)?)
+}
 
 fn check_work_range(config: &PlatformConfig, target: Pose) -> Result<(), PlatformFailure> {
     let degrees = target.angle.value().to_degrees();

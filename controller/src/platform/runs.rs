@@ -7,6 +7,8 @@ use serde_json::json;
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
+use crate::platform::target::parts;
+use crate::platform::together::MOVES;
 use crate::platform::{PlatformFailure, PlatformTeller};
 use crate::runs::{Found, Group, GroupRuns, Moved, Planned, Task, Work};
 
@@ -21,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    moves: Some(&MOVES),
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {
@@ -30,6 +33,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
             name: WHOLE.to_owned(),
             axes: screws.map(|it| it.axis.clone()).collect(),
             moved: Moved::Together,
+            parts: parts(),
             journals: WHOLE.to_owned(),
             runs: &RUNS,
         }

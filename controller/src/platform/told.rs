@@ -1,6 +1,7 @@
 //! What an alignment platform gave, in the words of the command line.
 
 use crate::platform::calibrate::PlatformCalibrated;
+use crate::platform::motion::PlatformMoved;
 use crate::platform::verify::PlatformVerified;
 use crate::platform::zero::PlatformZeroed;
 use crate::runs::Told;
@@ -14,4 +15,6 @@ pub struct PlatformTeller {
     pub calibrated: fn(calibrated: &PlatformCalibrated) -> Told,
     /// A verification, with a calibration or without one.
     pub verified: fn(verified: &PlatformVerified, compensated: bool) -> Told,
+    /// A move that was made.
+    pub moved: fn(moved: &PlatformMoved) -> Told,
 }

@@ -9,11 +9,11 @@ use units::{Metres, Radians};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
-use crate::platform::AlignConfig;
 use crate::platform::PoseEntry;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::state::{difference, largest_error};
+use crate::platform::{AlignConfig, PlatformConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
 use crate::run::note_failure;
 use crate::store::{Journal, Store};
@@ -185,32 +185,28 @@ impl AlignmentPlatform<'_> {
         Ok(checked)
     }
 
-    /// Whether it is configured how the platform is moved until the image agrees.
-    ///
-    /// # Errors
-    /// When it is not.
-    pub fn check_alignable(&self) -> Result<(), Failure> {
-        self.alignment().map(|_| ())
-    }
-
-    fn alignment(&self) -> Result<&AlignConfig, Failure> {
-        let align = self.config.align.as_ref();
-        Ok(align.ok_or(PlatformFailure::NotConfigured { section: "align" })?)
-    }
-
     /// Moves to `target`, then on until the image agrees with it.
     ///
     /// # Errors
     /// As [`Self::move_to`], and when it does not agree after the moves allowed.
     pub fn align(&mut self, target: Pose) -> Result<Aligned, Failure> {
-        let align = self.alignment()?.clone();
+        self.align_by(target, Correction::On)
+    }
+
+    /// The same with the screws' calibrations or without them.
+    pub(super) fn align_by(
+        &mut self,
+        target: Pose,
+        correction: Correction,
+    ) -> Result<Aligned, Failure> {
+        let align = alignment(self.config)?.clone();
         let edge = Metres::from_mm(self.config.edge_mm);
         let limit = Metres::from_um(align.tolerance_um);
         let mut told = target;
         let mut open_loop = None;
         let mut left = Metres::ZERO;
         for moves in 1..=align.iterations_max {
-            self.move_to(told)?;
+            self.move_by(told, correction)?;
             let error = difference(self.measure_pose()?, target);
             left = largest_error(error, edge);
             let open_loop = *open_loop.get_or_insert(left);
@@ -296,6 +292,13 @@ fn spread(seed: u64, index: u64, dimension: usize) -> f64 {
     let begin = (seed as f64 * 0.618_033_988_749_894_9).fract();
     let place = (begin + STEPS[dimension] * (index + 1) as f64).fract();
     2.0 * place - 1.0
+}
+
+/// How a platform is moved until the image agrees.
+pub(super) fn alignment(config: &PlatformConfig) -> Result<&AlignConfig, PlatformFailure> {
+    let section = "align";
+    let align = config.align.as_ref();
+    align.ok_or(PlatformFailure::NotConfigured { section })
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use crate::store::Store;
 use machine::Stage;
 
 /// The datum is what everything is measured from: it is looked at so many times more often.
-const DATUM_LOOKS: u32 = 8;
+pub(super) const DATUM_LOOKS: u32 = 8;
 
 /// A platform that was zeroed.
 #[derive(Clone, Debug, PartialEq)]

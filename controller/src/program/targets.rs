@@ -36,17 +36,23 @@ pub(crate) fn axis_target(text: &str) -> Result<(String, Metres), Failure> {
 pub(crate) struct AskedMotion {
     /// What the request says, but for what whoever asks agrees to.
     pub(crate) request: Value,
+    /// What must have its zero: axes, or the groups that they are zeroed with.
+    pub(crate) zeroed: Vec<String>,
     /// What is to be said of an axis besides what the service says.
     pub(crate) notes: Vec<(String, String)>,
 }
 
 /// The move of linear axes, each by itself.
 pub(crate) fn axis_motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
-    let targets = axis_targets(args)?.into_iter();
-    let targets = targets.map(|(axis, it)| (axis, json!({"value": it.mm(), "unit": "mm"})));
+    let targets = axis_targets(args)?;
+    let zeroed = targets.iter().map(|it| it.0.clone()).collect();
+    let targets = targets
+        .into_iter()
+        .map(|(axis, it)| (axis, json!({"value": it.mm(), "unit": "mm"})));
     let targets: Map<String, Value> = targets.collect();
     Ok(AskedMotion {
         request: json!({"targets": targets}),
+        zeroed,
         notes: Vec::new(),
     })
 }

@@ -27,6 +27,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    moves: None,
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {

@@ -6,6 +6,7 @@ use machine::records::Store;
 use super::person::Person;
 use super::task::{Found, Planned, Task, Work};
 use super::teller::Teller;
+use super::together::{GroupMove, GroupMoved, GroupMoves, Judge, Part};
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
@@ -31,6 +32,8 @@ pub struct Group {
     pub axes: Vec<String>,
     /// How they are moved.
     pub moved: Moved,
+    /// Where it is as one, part by part; nothing of axes that are only moved by themselves.
+    pub parts: Vec<Part>,
     /// What its journals are called.
     pub(crate) journals: String,
     /// What its kind does for it.
@@ -54,6 +57,8 @@ pub(crate) struct GroupRuns {
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
     pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
+    /// How it is moved as one, where it is.
+    pub(crate) moves: Option<&'static GroupMoves>,
 }
 
 /// Which calibration each axis uses.
@@ -66,6 +71,7 @@ impl Group {
             name: axis.to_owned(),
             axes: vec![axis.to_owned()],
             moved: Moved::Alone,
+            parts: Vec::new(),
             journals: axis.to_owned(),
             runs,
         }
@@ -140,5 +146,38 @@ impl Group {
         store: &Store,
     ) -> Result<Vec<(String, Option<String>)>, Failure> {
         (self.runs.load)(machine, store, &self.name)
+    }
+
+    fn moves(&self) -> Result<&'static GroupMoves, Failure> {
+        self.runs.moves.ok_or_else(|| Failure::Usage {
+            what: format!("{} is not moved as one", self.name),
+            help: "move its axes by themselves".into(),
+        })
+    }
+
+    /// Who judges its moves as one, by the calibrations that are in use now.
+    ///
+    /// # Errors
+    /// When it is not moved as one, or a calibration cannot be read.
+    pub fn judge(&self, machine: &mut Machine, store: &Store) -> Result<Judge, Failure> {
+        (self.moves()?.judge)(machine, store)
+    }
+
+    /// Moves it as one.
+    ///
+    /// # Errors
+    /// Those of the procedure.
+    pub fn move_to(
+        &self,
+        machine: &mut Machine,
+        store: &Store,
+        asked: &GroupMove,
+        teller: Option<&Teller>,
+    ) -> Result<GroupMoved, Failure> {
+        let mut moved = (self.moves()?.perform)(machine, store, asked, teller)?;
+        if let (Some(told), Some(teller)) = (&mut moved.told, teller) {
+            told.value["counters"] = (teller.counters)(machine);
+        }
+        Ok(moved)
     }
 }

@@ -8,13 +8,16 @@ mod group;
 mod person;
 mod task;
 mod teller;
+mod together;
 
 pub use group::{Group, Moved};
 pub use person::{Person, Question};
 pub use task::{Found, Planned, Task, Travel};
 pub use teller::{Teller, Told};
+pub use together::{GroupMove, GroupMoved, Judge, Part, PartMoved, Place};
 
 pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]
 pub(crate) use teller::Words;
+pub(crate) use together::GroupMoves;

@@ -5,6 +5,7 @@ use units::Metres;
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::handle::Core;
+use crate::memories::Memories;
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::failure::VolumetricFailure;
 
@@ -13,6 +14,7 @@ use crate::volumetric::failure::VolumetricFailure;
 pub struct WorkVolume<'m> {
     pub(crate) core: Core<'m>,
     pub(crate) config: &'m VolumetricConfig,
+    pub(crate) memories: &'m mut Memories,
 }
 
 impl Machine {
@@ -21,10 +23,14 @@ impl Machine {
     /// # Errors
     /// When its errors are not corrected.
     pub fn volumetric(&mut self) -> Result<WorkVolume<'_>, Failure> {
-        let (core, _) = Core::of(self);
+        let (core, memories) = Core::of(self);
         let config = core.config.volumetric.as_ref();
         let config = config.ok_or(VolumetricFailure::None)?;
-        Ok(WorkVolume { core, config })
+        Ok(WorkVolume {
+            core,
+            config,
+            memories,
+        })
     }
 }
 

@@ -39,6 +39,7 @@ pub(crate) mod line;
 mod log;
 mod memory;
 pub(crate) mod memory_import;
+pub(crate) mod motion;
 mod moves;
 pub(crate) mod record;
 pub(crate) mod reference;

@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use compensator::volumetric::{Axis, Point};
+use compensator::volumetric::{Axis, Point, Volume};
 use units::Metres;
 
 use crate::config::MachineConfig;
@@ -123,10 +123,8 @@ impl WorkVolume<'_> {
     pub fn check(&self, point: Point) -> Result<(), VolumetricFailure> {
         let config = self.core.config.volumetric.as_ref();
         let config = config.ok_or(VolumetricFailure::None)?;
-        let volume = work_volume(config)?;
         let reach = Metres::from_um(config.compensation.size_limit_um);
-        volume.nearest_within(point, reach)?;
-        Ok(())
+        check_in(&work_volume(config)?, reach, point)
     }
 
     fn enter_volume(&mut self) -> Result<(), Failure> {
@@ -257,6 +255,16 @@ fn expect_cause(cause: Cause, expected: Cause) -> Result<(), Failure> {
         return Ok(());
     }
     Err(VolumetricFailure::NotThere { cause }.into())
+}
+
+/// Whether `point` is in `volume`, or so little beyond its end that it is at its end.
+pub(super) fn check_in(
+    volume: &Volume,
+    reach: Metres,
+    point: Point,
+) -> Result<(), VolumetricFailure> {
+    volume.nearest_within(point, reach)?;
+    Ok(())
 }
 
 /// From the first sample until a detector's value is given out as it is.

@@ -6,10 +6,11 @@ use serde_json::json;
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::runs::{Found, Group, GroupRuns, Moved, Planned, Task, Work};
+use crate::runs::{Found, Group, GroupRuns, Moved, Part, Planned, Task, Work};
 use crate::volumetric::asked::Asking;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::motion::MOVES;
 use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricTeller, WarmUp};
 
 /// What the three axes are called together.
@@ -28,6 +29,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load: |_, _, _| Ok(Vec::new()),
+    moves: Some(&MOVES),
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {
@@ -36,6 +38,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
         name: WHOLE.to_owned(),
         axes: volume.axes.to_vec(),
         moved: Moved::CorrectedTogether,
+        parts: volume.axes.iter().map(|it| Part::of_length(it)).collect(),
         journals: GEOMETRY.to_owned(),
         runs: &RUNS,
     });

@@ -1,5 +1,7 @@
 //! What three axes gave, in the words of the command line.
 
+use machine::engine::Live;
+
 use crate::runs::Told;
 use crate::volumetric::VolumetricCalibrated;
 use crate::volumetric::reference::VolumetricReferenced;
@@ -16,4 +18,6 @@ pub struct VolumetricTeller {
     pub verified: fn(verified: &VolumetricVerified) -> Told,
     /// References that were taken.
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
+    /// A corrected move that was made, by its last period.
+    pub moved: fn(live: &Live) -> Told,
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use machine::Stage;
 use truestage::Machine;
-use truestage::runs::Group;
+use truestage::runs::{Group, GroupMove, Judge};
 
 use super::Keeper;
 use super::setup::{Plans, plans, resumed};
@@ -20,12 +20,34 @@ pub(crate) struct Grouped {
     resumed: Vec<Stage>,
     /// The numbers of its axes.
     pub(super) axes: Vec<usize>,
+    /// Who judges its moves as one, or why nobody can.
+    judge: Option<Result<Judge, Problem>>,
 }
 
 impl Grouped {
     /// Whether its run of `kind` goes on where it was left.
     pub(super) fn is_resumed(&self, kind: RunKind) -> bool {
         self.resumed.contains(&kind.stage())
+    }
+
+    /// Whether it can be moved so.
+    pub(super) fn judge(
+        &self,
+        machine: &machine::Machine,
+        asked: &GroupMove,
+    ) -> Result<(), Problem> {
+        match &self.judge {
+            Some(Ok(judge)) => Ok(judge.judge(machine, asked)?),
+            Some(Err(problem)) => Err(problem.clone()),
+            None => {
+                let what = format!("{} is not moved as one", self.group.name);
+                Err(Problem::new(
+                    Code::NotOffered,
+                    what,
+                    "move its axes by themselves",
+                ))
+            }
+        }
     }
 }
 
@@ -40,6 +62,7 @@ impl Keeper {
                 resumed: resumed(machine, &group),
                 group: Arc::new(group),
                 axes,
+                judge: None,
             });
         }
     }
@@ -48,6 +71,14 @@ impl Keeper {
     pub(crate) fn plan_anew(&mut self, machine: &mut Machine) {
         for grouped in &mut self.groups {
             grouped.plans = plans(machine, &grouped.group);
+        }
+    }
+
+    /// Moves of the group `name` as one are judged by what is stored now.
+    pub(crate) fn set_judge(&mut self, name: &str, judge: Result<Judge, Problem>) {
+        let mut groups = self.groups.iter_mut();
+        if let Some(grouped) = groups.find(|it| it.group.name == name) {
+            grouped.judge = Some(judge);
         }
     }
 

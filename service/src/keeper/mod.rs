@@ -65,6 +65,8 @@ pub(crate) enum Mode {
 pub(crate) enum Job {
     /// A run, under its name.
     Run(Arc<str>),
+    /// A motion of axes that move as one, under its name.
+    Move(Arc<str>),
     /// Another calibration, for somebody who waits.
     Choose(Choice, String, Reply),
     /// A reset, for somebody who waits.
@@ -192,7 +194,8 @@ impl Keeper {
         self.publish(machine);
         self.send_answers();
         asked.and(carried_on)?;
-        if self.mode == Mode::Procedure && self.runs.is_to_end() {
+        let is_to_end = self.runs.is_to_end() || self.motions.is_to_end();
+        if self.mode == Mode::Procedure && is_to_end {
             return Err(Failure::Interrupted);
         }
         Ok(())
@@ -255,6 +258,7 @@ impl Keeper {
             seat.target = None;
             seat.set_point = None;
             seat.standard_uncertainty = None;
+            seat.rests_at = None;
         }
         self.set_mode(Mode::Idle);
         self.publish(machine);

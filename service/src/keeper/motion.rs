@@ -4,6 +4,7 @@ mod accept;
 mod going;
 mod jog;
 mod shown;
+mod together;
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -15,6 +16,7 @@ use truestage::linear::Corrected;
 use units::{MetresPerSecond, Time};
 
 use self::going::{Going, Wanted};
+use self::together::Together;
 use super::Keeper;
 use super::seat::{Seat, Task};
 use super::stop::{cause_of, stopped_by};
@@ -90,12 +92,21 @@ pub(super) struct Motion {
     /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
     jog: Option<MetresPerSecond>,
     legs: Vec<Leg>,
+    /// Its axes move as one: then it has no legs.
+    together: Option<Together>,
     phase: Phase,
 }
 
 impl Motion {
     fn axes(&self) -> impl Iterator<Item = usize> + Clone {
-        self.legs.iter().map(|leg| leg.at)
+        let as_one = self.together.iter().flat_map(Together::axes);
+        self.legs.iter().map(|leg| leg.at).chain(as_one)
+    }
+
+    /// Whether a procedure of it has the machine.
+    fn has_procedure(&self) -> bool {
+        let together = self.together.as_ref();
+        together.is_some_and(Together::is_under_way)
     }
 }
 
@@ -109,6 +120,12 @@ pub(super) struct Motions {
 }
 
 impl Motions {
+    /// Whether the procedure that runs is one of theirs, and has to end.
+    pub(super) fn is_to_end(&self) -> bool {
+        let mut active = self.active.iter();
+        active.any(|it| matches!(it.phase, Phase::Stopping(_)) && it.has_procedure())
+    }
+
     /// Whether none is under way or waits.
     pub(super) fn is_empty(&self) -> bool {
         self.active.is_empty()
@@ -148,7 +165,8 @@ impl Keeper {
         let mut earlier = self.motions.active[..number].iter();
         let is_next = !earlier.any(|it| it.axes().any(|at| motion.axes().any(|own| own == at)));
         let are_free = motion.axes().all(|at| self.seats[at].is_free());
-        if !matches!(motion.phase, Phase::Queued) || !is_next || !are_free {
+        let can_begin = are_free && (motion.together.is_none() || self.require_no_run().is_ok());
+        if !matches!(motion.phase, Phase::Queued) || !is_next || !can_begin {
             return Ok(());
         }
         let mut motion = motion.clone();
@@ -169,6 +187,7 @@ impl Keeper {
 
     fn begin_legs(&mut self, machine: &mut Machine, motion: &mut Motion) -> Result<(), Failure> {
         motion.phase = Phase::Moving;
+        self.begin_together(motion);
         for leg in &mut motion.legs {
             let Some(going) = leg.going else { continue };
             let seat = &mut self.seats[leg.at];
@@ -182,6 +201,7 @@ impl Keeper {
                 Some(_) => (Time::NEVER, Task::Jog(id)),
             };
             seat.target = Some(going.target(leg.target));
+            seat.rests_at = None;
             let (phase, first) = match by_way_of {
                 Some(from) => (LegPhase::OnTheWay, from),
                 None => (LegPhase::Moving, going.set_point()),
@@ -218,10 +238,13 @@ impl Keeper {
         match &motion.phase {
             Phase::Queued => Ok(None),
             Phase::Stopping(end) => {
-                let is_over = !self.is_stopping(motion.axes());
+                let is_over = !self.is_stopping(motion.axes()) && !motion.has_procedure();
                 Ok(is_over.then(|| end.clone()))
             }
-            Phase::Moving => self.advance_legs(machine, number),
+            Phase::Moving => match &motion.together {
+                Some(together) => Ok(self.advance_together(machine, together)),
+                None => self.advance_legs(machine, number),
+            },
         }
     }
 
@@ -340,6 +363,9 @@ impl Keeper {
         for leg in &motion.legs {
             self.settle(machine, leg);
         }
+        if let Some(together) = &motion.together {
+            self.settle_together(together);
+        }
         let view = Arc::new(shown::ended(
             &motion,
             &self.seats,
@@ -358,8 +384,8 @@ impl Keeper {
         self.publish(machine);
         let motion = self.motions.active.remove(number);
         let cause = view.cause.clone().map(Arc::new);
-        for leg in &motion.legs {
-            let seat = &mut self.seats[leg.at];
+        for at in motion.axes() {
+            let seat = &mut self.seats[at];
             if seat.is_of(&motion.id) {
                 seat.task = Task::Free;
             }

@@ -105,7 +105,7 @@ impl Keeper {
         if self.mode != Mode::Procedure && self.job.is_none() {
             return Ok(());
         }
-        let what = "another run is under way";
+        let what = "another run, or a motion of axes that move as one, is under way";
         let help = "wait for its end or abort it";
         Err(Problem::new(Code::AxisBusy, what, help))
     }

@@ -204,6 +204,7 @@ impl Keeper {
         }
         for at in axes {
             self.seats[at].task = SeatTask::Run(id.into(), kind);
+            self.seats[at].rests_at = None;
         }
         self.job = Some(Job::Run(id.into()));
         let run = self.runs.find(id)?;

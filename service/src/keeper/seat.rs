@@ -12,6 +12,7 @@ use wire::cia402::PowerState;
 use super::mechanics::Mechanics;
 use crate::coordinate::Coordinate;
 use crate::order::Reply;
+use crate::quantity::Quantity;
 use crate::request::RunKind;
 use crate::snapshot::{AxisSample, CalibrationInUse};
 use crate::view::{AxisState, Cause};
@@ -22,6 +23,8 @@ pub(super) enum Task {
     Free,
     /// The motion of this name.
     Motion(Arc<str>),
+    /// The motion of this name, as one with others.
+    Together(Arc<str>),
     /// The jog of this name.
     Jog(Arc<str>),
     /// The run of this name.
@@ -48,6 +51,8 @@ pub(crate) struct Seat {
     pub(super) target: Option<Coordinate>,
     pub(super) set_point: Option<Coordinate>,
     pub(super) standard_uncertainty: Option<Coordinate>,
+    /// Where a move that it made as one with others has left its point; it stands there still.
+    pub(super) rests_at: Option<Coordinate>,
     pub(super) last_cause: Option<Arc<Cause>>,
     pub(super) state: AxisState,
 }
@@ -61,7 +66,7 @@ impl Seat {
     /// Whether the motion or run `id` has it.
     pub(super) fn is_of(&self, id: &str) -> bool {
         match &self.task {
-            Task::Motion(of) | Task::Jog(of) | Task::Run(of, _) => **of == *id,
+            Task::Motion(of) | Task::Together(of) | Task::Jog(of) | Task::Run(of, _) => **of == *id,
             Task::Free | Task::Power(_) | Task::Stopping => false,
         }
     }
@@ -70,7 +75,7 @@ impl Seat {
     pub(super) fn user(&self) -> String {
         match &self.task {
             Task::Free => "nobody".into(),
-            Task::Motion(id) => format!("motion {id}"),
+            Task::Motion(id) | Task::Together(id) => format!("motion {id}"),
             Task::Jog(id) => format!("jog {id}"),
             Task::Run(id, _) => format!("run {id}"),
             Task::Power(_) => "a change of its power".into(),
@@ -87,6 +92,7 @@ impl Seat {
             (false, _) => {
                 self.standing_since = None;
                 self.standard_uncertainty = None;
+                self.rests_at = None;
             }
             (true, None) => self.standing_since = Some(sampled.at),
             (true, Some(_)) => {}
@@ -114,6 +120,7 @@ impl Seat {
             _ if is_faulted => AxisState::ErrorStop,
             Task::Stopping => AxisState::Stopping,
             Task::Jog(_) => AxisState::ContinuousMotion,
+            Task::Together(_) => AxisState::SynchronizedMotion,
             Task::Run(_, RunKind::Zero) => AxisState::Homing,
             // Its run waits for a person with his hands in the machine.
             Task::Run(..) if power != Some(PowerState::OperationEnabled) => AxisState::Disabled,
@@ -132,14 +139,24 @@ impl Seat {
         power == Some(PowerState::OperationEnabled)
     }
 
+    /// Where it is now, corrected where something corrects it, and by its encoder.
+    pub(super) fn place_shown(&self, machine: &Machine) -> (Option<Quantity>, Option<Quantity>) {
+        let sample = self.sample(machine);
+        let place = sample.place.or(sample.encoder);
+        let shown = |it: Option<Coordinate>| it.map(Coordinate::shown);
+        (shown(place), shown(sample.encoder))
+    }
+
     /// What is published of it.
     pub(super) fn sample(&self, machine: &Machine) -> AxisSample {
         let sampled = self.mechanics.sampled(machine, &self.name);
         let encoder = sampled.map(|it| it.position);
         let homed = machine.is_zeroed(&self.name);
-        let place = encoder
-            .filter(|_| homed)
-            .and_then(|it| self.mechanics.place(machine, &self.name, it));
+        let place = encoder.filter(|_| homed).and_then(|it| {
+            self.mechanics
+                .place(machine, &self.name, it)
+                .or(self.rests_at)
+        });
         AxisSample {
             state: self.state,
             encoder,
@@ -150,7 +167,9 @@ impl Seat {
             homed,
             calibration: self.calibration.clone(),
             used_by: match &self.task {
-                Task::Motion(id) | Task::Jog(id) | Task::Run(id, _) => Some(Arc::clone(id)),
+                Task::Motion(id) | Task::Together(id) | Task::Jog(id) | Task::Run(id, _) => {
+                    Some(Arc::clone(id))
+                }
                 Task::Free | Task::Power(_) | Task::Stopping => None,
             },
             last_cause: self.last_cause.clone(),

@@ -13,7 +13,7 @@ use crate::problem::Problem;
 use crate::quantity::Quantity;
 use crate::request::RunKind;
 use crate::snapshot::{Fixed, FixedAxis};
-use crate::view::{AxisState, RunPlanView};
+use crate::view::{AxisState, GroupView, RunPlanView};
 
 /// What never changes of `machine`.
 pub(crate) fn fixed(machine: &mut Machine, groups: &[Group]) -> Result<Fixed, Failure> {
@@ -35,6 +35,17 @@ pub(crate) fn fixed(machine: &mut Machine, groups: &[Group]) -> Result<Fixed, Fa
         config_hash: machine.config_hash().as_str().to_owned(),
         started: utc_now(),
         axes,
+        groups: groups.iter().filter_map(moved_as_one).collect(),
+    })
+}
+
+fn moved_as_one(group: &Group) -> Option<GroupView> {
+    let targets = group.parts.iter().map(|it| it.name.clone());
+    let targets: Vec<_> = targets.collect();
+    (!targets.is_empty()).then(|| GroupView {
+        name: group.name.clone(),
+        axes: group.axes.clone(),
+        targets,
     })
 }
 
@@ -68,6 +79,7 @@ fn seat(machine: &mut Machine, groups: &[Group], name: &str) -> Result<Seat, Fai
         target: None,
         set_point: None,
         standard_uncertainty: None,
+        rests_at: None,
         last_cause: None,
         state: AxisState::Disabled,
     })

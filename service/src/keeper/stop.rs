@@ -122,7 +122,7 @@ impl Keeper {
                 self.answers.push((reply, Err(problem)));
             }
         }
-        if let Some(Job::Run(_)) = self.job {
+        if let Some(Job::Run(_) | Job::Move(_)) = self.job {
             self.job = None;
         }
     }

@@ -112,7 +112,8 @@ pub(crate) fn targets() -> Schema {
     ObjectBuilder::new()
         .schema_type(Type::Object)
         .description(Some(
-            "Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time",
+            "Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time; \
+             those of a platform (x, y, theta) and of three axes that are corrected together move as one",
         ))
         .additional_properties(Some(Ref::from_schema_name(PlaceIn::name())))
         .min_properties(Some(1))

@@ -334,6 +334,7 @@ fn motions_of_disjoint_axes_overlap() {
             ..of(&[("x", 2.0)])
         };
         bed.refused(&refused, Code::NotOffered);
+        bed.refused(&compensated("x", 2.0), Code::Calibration);
         let first = bed.begin(&of(&[("x", 2.0)]));
         let second = bed.begin(&of(&[("y", 1.0), ("z", 1.0)]));
         bed.refused(&of(&[("x", 3.0), ("y", 3.0)]), Code::AxisBusy);

@@ -7,8 +7,7 @@ use crate::Failure;
 use crate::config::Loaded;
 use crate::platform::{PlatformConfig, PlatformFailure};
 use crate::program::intended::{Intent, Step, calibration, nowhere};
-use crate::program::platform::target::NamedPose;
-use crate::program::platform::verbs::{refuse_impossible, refuse_uncalibrated};
+use crate::program::platform::target::asked;
 use crate::program::{AxisArgs, MoveArgs};
 
 /// What all screws are called together.
@@ -90,7 +89,8 @@ pub(crate) fn intended(
         Intent::Verify(args) => {
             let step = verified(platform)?;
             if !args.uncompensated {
-                refuse_uncalibrated(&mut nowhere::machine(loaded), store)?;
+                let mut machine = nowhere::machine(loaded);
+                machine.platform()?.require_calibrations(store)?;
             }
             steps.push(step);
         }
@@ -156,16 +156,15 @@ fn moved(
     platform: &PlatformConfig,
     args: &MoveArgs,
 ) -> Result<Step, Failure> {
-    let named = NamedPose::parse(&args.targets)?;
-    let compensated = !args.agreed.uncompensated;
+    let asked = asked(args)?;
     let mut machine = nowhere::machine(loaded);
-    refuse_impossible((&mut machine, store), named, (args.align, compensated))?;
+    machine.platform()?.check_asked(store, &asked)?;
     let mut text = format!(
         "to {}, the screw with the longest way at {} mm/s",
         args.targets.join(" "),
         Short(platform.speed_mm_per_s)
     );
-    let unnamed = named.unnamed();
+    let unnamed = asked.named.unnamed();
     if !unnamed.is_empty() {
         text += &format!(
             "; {} stay where the camera sees them before the zero",

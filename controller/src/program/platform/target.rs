@@ -1,79 +1,66 @@
-//! Where a platform is told to go, as a person types it: what is not named stays where it is.
+//! Where a platform is told to go, as a person types it.
 
+use serde_json::{Map, Value, json};
+use units::Metres;
 use units::text::{angle, length};
-use units::{Metres, Radians};
 
+use super::PLATFORM;
 use crate::Failure;
-use crate::platform::Pose;
+use crate::platform::{NamedPose, PoseAsked};
 use crate::program::MoveArgs;
 use crate::program::targets::AskedMotion;
 
-/// A pose of which not every part need be named.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct NamedPose {
-    x: Option<Metres>,
-    y: Option<Metres>,
-    angle: Option<Radians>,
+/// `x=1mm y=-300um theta=20arcsec`, each at most once.
+pub(crate) fn parse(words: &[String]) -> Result<NamedPose, Failure> {
+    if words.is_empty() {
+        return Err(Failure::Usage {
+            what: "`move` needs a target".into(),
+            help: "write x=1mm y=-0.5mm theta=20arcsec; what is not named stays where it is".into(),
+        });
+    }
+    let mut pose = NamedPose::default();
+    for word in words {
+        take(&mut pose, word).ok_or_else(|| Failure::Usage {
+            what: format!("`{word}` is not part of a pose"),
+            help: "write x=1mm, y=-300um, theta=20arcsec or theta=0.5deg, each once".into(),
+        })?;
+    }
+    Ok(pose)
 }
 
-impl NamedPose {
-    /// `x=1mm y=-300um theta=20arcsec`, each at most once.
-    pub(crate) fn parse(words: &[String]) -> Result<Self, Failure> {
-        if words.is_empty() {
-            return Err(Failure::Usage {
-                what: "`move` needs a target".into(),
-                help: "write x=1mm y=-0.5mm theta=20arcsec; what is not named stays where it is"
-                    .into(),
-            });
-        }
-        let mut pose = Self::default();
-        for word in words {
-            pose.take(word).ok_or_else(|| Failure::Usage {
-                what: format!("`{word}` is not part of a pose"),
-                help: "write x=1mm, y=-300um, theta=20arcsec or theta=0.5deg, each once".into(),
-            })?;
-        }
-        Ok(pose)
-    }
+fn take(pose: &mut NamedPose, word: &str) -> Option<()> {
+    let (name, value) = word.split_once('=')?;
+    let is_new = match name {
+        "x" => pose.x.replace(length(value)?).is_none(),
+        "y" => pose.y.replace(length(value)?).is_none(),
+        "theta" => pose.angle.replace(angle(value)?).is_none(),
+        _ => false,
+    };
+    is_new.then_some(())
+}
 
-    fn take(&mut self, word: &str) -> Option<()> {
-        let (name, value) = word.split_once('=')?;
-        let is_new = match name {
-            "x" => self.x.replace(length(value)?).is_none(),
-            "y" => self.y.replace(length(value)?).is_none(),
-            "theta" => self.angle.replace(angle(value)?).is_none(),
-            _ => false,
-        };
-        is_new.then_some(())
-    }
-
-    /// The parts that are not named.
-    pub(crate) fn unnamed(&self) -> Vec<&'static str> {
-        let named = [
-            ("x", self.x.is_some()),
-            ("y", self.y.is_some()),
-            ("theta", self.angle.is_some()),
-        ];
-        let unnamed = named.iter().filter(|(_, is_named)| !is_named);
-        unnamed.map(|(name, _)| *name).collect()
-    }
-
-    /// The whole pose, where what is not named is that of `here`.
-    pub(crate) fn from(&self, here: Pose) -> Pose {
-        Pose {
-            x: self.x.unwrap_or(here.x),
-            y: self.y.unwrap_or(here.y),
-            angle: self.angle.unwrap_or(here.angle),
-        }
-    }
+/// What the words of a `move` ask for.
+pub(super) fn asked(args: &MoveArgs) -> Result<PoseAsked, Failure> {
+    Ok(PoseAsked {
+        named: parse(&args.targets)?,
+        align: args.align,
+        compensated: !args.agreed.uncompensated,
+    })
 }
 
 /// The same as a service is asked for it.
 pub(super) fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
-    NamedPose::parse(&args.targets)?;
-    Err(Failure::Usage {
-        what: "a service keeps this machine, and does not move platforms".into(),
-        help: "end the service first; then this verb moves it".into(),
+    let NamedPose { x, y, angle } = parse(&args.targets)?;
+    let length = |it: Metres| json!({"value": it.mm(), "unit": "mm"});
+    let turn = angle.map(|it| json!({"value": it.value(), "unit": "rad"}));
+    let parts = [("x", x.map(length)), ("y", y.map(length)), ("theta", turn)];
+    let named = parts.into_iter();
+    let named = named.filter_map(|(name, it)| Some((name.to_owned(), it?)));
+    let targets: Map<String, Value> = named.collect();
+    Ok(AskedMotion {
+        request: json!({"targets": targets, "align": args.align}),
+        zeroed: vec![PLATFORM.to_owned()],
+        notes: Vec::new(),
     })
 }
 
@@ -83,7 +70,7 @@ mod tests {
 
     fn parsed(words: &[&str]) -> Result<NamedPose, Failure> {
         let words: Vec<_> = words.iter().map(|it| (*it).to_owned()).collect();
-        NamedPose::parse(&words)
+        parse(&words)
     }
 
     #[test]
@@ -104,18 +91,5 @@ mod tests {
         ] {
             assert!(parsed(words).is_err(), "{words:?}");
         }
-    }
-
-    #[test]
-    fn what_is_not_named_stays_where_it_is() {
-        let here = Pose {
-            x: Metres(1e-3),
-            y: Metres(2e-3),
-            angle: Radians(3e-3),
-        };
-        let pose = parsed(&["y=0mm"]).unwrap();
-        assert_eq!(pose.unnamed(), ["x", "theta"]);
-        let y = Metres::ZERO;
-        assert_eq!(pose.from(here), Pose { y, ..here });
     }
 }

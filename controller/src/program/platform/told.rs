@@ -11,4 +11,5 @@ pub(crate) static TELLER: PlatformTeller = PlatformTeller {
         value: verbs::calibrated_value(made),
     },
     verified: verbs::verified_as,
+    moved: verbs::moved,
 };

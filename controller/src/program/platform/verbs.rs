@@ -5,12 +5,12 @@ use serde_json::{Value, json};
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::{Aligned, PlatformVerified};
 use crate::platform::zero::PlatformZeroed;
-use crate::platform::{Pose, PoseMoved};
+use crate::platform::{PlatformMoved, Pose, PoseMoved};
 use crate::ports::Use;
 use crate::program::json as to_json;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::platform::fit::outlier_lines;
-use crate::program::platform::target::NamedPose;
+use crate::program::platform::target::asked;
 use crate::program::platform::uncertainty;
 use crate::program::session::Session;
 use crate::program::text::verdict;
@@ -109,114 +109,44 @@ pub(super) fn verified_as(verified: &PlatformVerified, compensated: bool) -> Tol
 }
 
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
-    let named = NamedPose::parse(&args.targets)?;
+    let asked = asked(args)?;
     let mut session = Session::open(&args.machine, "move", Use::Measurement, output)?;
-    let compensated = !args.agreed.uncompensated;
-    let machine = (&mut session.machine, &session.store);
-    refuse_impossible(machine, named, (args.align, compensated))?;
-    let look = |machine: &mut Machine| match named.unnamed().is_empty() {
-        true => Ok(None),
-        false => machine.platform()?.look().map(Some),
-    };
+    let store = session.store.clone();
+    session.machine.platform()?.check_asked(&store, &asked)?;
+    let look = |machine: &mut Machine| machine.platform()?.look_for(&asked);
     let run = |machine: &mut Machine, store: &Store, before: Option<Pose>| {
-        let mut platform = machine.platform()?;
-        let here = before.map(|seen| platform.since_zero(seen)).transpose()?;
-        let target = named.from(here.unwrap_or_default());
-        let calibrations = match compensated {
-            true => platform.load_active(store)?,
-            false => Vec::new(),
-        };
-        let (moved, aligned) = match args.align {
-            true => (None, Some(platform.align(target)?)),
-            false => (Some(platform.move_to(target)?), None),
-        };
-        let seen = platform.measure_pose()?;
-        Ok(PlatformMove {
-            target,
-            calibrations,
-            moved,
-            aligned,
-            seen,
-        })
+        machine.platform()?.move_asked(store, &asked, before)
     };
     let (it, counters) = zeroed_platform(session, look, run)?;
-    let mut value = it.value(&named.unnamed());
-    value["counters"] = counters;
-    output.result(&it.text(&named.unnamed()), &value)
+    output.told(moved(&it), counters)
 }
 
-/// What can be told before anything is sent. Where it stands, what is not named is judged after the zero.
-pub(super) fn refuse_impossible(
-    (machine, store): (&mut Machine, &Store),
-    named: NamedPose,
-    (align, compensated): (bool, bool),
-) -> Result<(), Failure> {
-    machine
-        .platform()?
-        .check_pose(named.from(Pose::default()))?;
-    if align {
-        machine.platform()?.check_alignable()?;
+pub(super) fn moved(it: &PlatformMoved) -> Told {
+    let mut text = format!(
+        "platform: target {}, the camera sees it at {}",
+        pose_text(it.target),
+        pose_text(it.seen)
+    );
+    if !it.unnamed.is_empty() {
+        let unnamed = it.unnamed.join(" and ");
+        text +=
+            &format!("\n{unnamed}, which nobody named: where the camera saw the platform before");
     }
-    match compensated {
-        true => refuse_uncalibrated(machine, store),
-        false => Ok(()),
+    if it.calibrations.is_empty() {
+        text += "\nNOT CORRECTED: the screws went by their encoders alone";
     }
-}
-
-/// Whether every screw has a calibration.
-pub(super) fn refuse_uncalibrated(machine: &mut Machine, store: &Store) -> Result<(), Failure> {
-    let without = machine.platform()?.without_calibration(store)?;
-    match without.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::NotCalibrated {
-            what: format!(
-                "the platform has screws without a calibration ({})",
-                without.join(", ")
-            ),
-        }),
-    }
-}
-
-/// A move of a platform as it was asked for, and what came of it.
-struct PlatformMove {
-    target: Pose,
-    calibrations: Vec<(String, Option<String>)>,
-    moved: Option<PoseMoved>,
-    aligned: Option<Aligned>,
-    seen: Pose,
-}
-
-impl PlatformMove {
-    fn text(&self, unnamed: &[&str]) -> String {
-        let mut text = format!(
-            "platform: target {}, the camera sees it at {}",
-            pose_text(self.target),
-            pose_text(self.seen)
-        );
-        if !unnamed.is_empty() {
-            let unnamed = unnamed.join(" and ");
-            text += &format!(
-                "\n{unnamed}, which nobody named: where the camera saw the platform before"
-            );
-        }
-        if self.calibrations.is_empty() {
-            text += "\nNOT CORRECTED: the screws went by their encoders alone";
-        }
-        text += &self.moved.as_ref().map_or(String::new(), moved_text);
-        text + &self.aligned.as_ref().map_or(String::new(), aligned_text)
-    }
-
-    fn value(&self, unnamed: &[&str]) -> Value {
-        json!({
-            "target": pose_value(self.target),
-            "unnamed": unnamed,
-            "seen": pose_value(self.seen),
-            "calibrations": self.calibrations,
-            "corrected": !self.calibrations.is_empty(),
-            "move": self.moved.as_ref().map(moved_value),
-            "alignment": self.aligned.as_ref().map(aligned_value),
-        })
-    }
+    text += &it.moved.as_ref().map_or(String::new(), moved_text);
+    text += &it.aligned.as_ref().map_or(String::new(), aligned_text);
+    let value = json!({
+        "target": pose_value(it.target),
+        "unnamed": it.unnamed,
+        "seen": pose_value(it.seen),
+        "calibrations": it.calibrations,
+        "corrected": !it.calibrations.is_empty(),
+        "move": it.moved.as_ref().map(moved_value),
+        "alignment": it.aligned.as_ref().map(aligned_value),
+    });
+    Told { text, value }
 }
 
 fn moved_text(moved: &PoseMoved) -> String {

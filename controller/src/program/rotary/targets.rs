@@ -38,6 +38,7 @@ pub(super) fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
         Some((axis.clone(), format!("axis {axis}: {note}")))
     });
     let notes = notes.collect();
+    let zeroed = targets.iter().map(|it| it.0.clone()).collect();
     let targets = targets.into_iter();
     let targets = targets.map(|(axis, it)| (axis, json!({"value": it.value(), "unit": "rad"})));
     let targets: Map<String, Value> = targets.collect();
@@ -49,6 +50,7 @@ pub(super) fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
     };
     Ok(AskedMotion {
         request: json!({"targets": targets, "way": way}),
+        zeroed,
         notes,
     })
 }

@@ -7,9 +7,10 @@ use units::{Metres, Several, Short};
 use crate::Failure;
 use crate::config::Loaded;
 use crate::program::intended::{Intent, Step, calibration, nowhere};
-use crate::program::volumetric::verbs::{never_measured, refuse_unreachable, targets, warm_up_of};
+use crate::program::volumetric::verbs::{targets, warm_up_of};
 use crate::program::{CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::calibrate::plan::volume_plan;
+use crate::volumetric::motion::never_measured;
 use crate::volumetric::{GEOMETRY, VolumeAxisName, VolumetricConfig, VolumetricFailure};
 
 /// What all three axes are called together.
@@ -142,7 +143,7 @@ fn moved(
     }
     let target = targets(args)?.from(volume.zero.index_mm.map(Metres::from_mm));
     let mut machine = nowhere::machine(loaded);
-    refuse_unreachable(&mut machine, target, compensated)?;
+    machine.volumetric()?.check_target(target, compensated)?;
     let at = [("x", target.x), ("y", target.y), ("z", target.z)];
     let at = at.map(|(axis, it)| format!("{axis} = {} mm", Short(it.mm())));
     let axes = volume

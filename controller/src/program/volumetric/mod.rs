@@ -22,10 +22,11 @@ use report::Made;
 
 use super::made_from::source;
 use super::show::Shown;
-use super::targets::axis_motion;
+use super::targets::{AskedMotion, axis_motion};
 use super::verbs::Verbs;
 use crate::Failure;
 use crate::config::MachineConfig;
+use crate::program::MoveArgs;
 use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog};
 use crate::volumetric::{GEOMETRY, MemoryName, REFERENCES, memory_pointer};
 
@@ -42,7 +43,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
-    motion: axis_motion,
+    motion,
     asked: asked::ASKED,
     words: &told::TELLER,
     shown: &[
@@ -65,6 +66,14 @@ fn made_from(path: &Path) -> Result<Made, Failure> {
     Ok(match source(path) {
         Some((store, name)) => Made::of(&store, &name)?,
         None => Made::default(),
+    })
+}
+
+/// The move of three axes as a service is asked for it; they are zeroed together.
+fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
+    Ok(AskedMotion {
+        zeroed: vec!["volume".to_owned()],
+        ..axis_motion(args)?
     })
 }
 

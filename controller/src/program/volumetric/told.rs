@@ -14,6 +14,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         text: verbs::verified_text(verified),
         value: verbs::verified_value(verified),
     },
+    moved: verbs::moved,
     referenced: |taken| Told {
         text: reference::referenced_text(taken),
         value: reference::referenced_value(taken),

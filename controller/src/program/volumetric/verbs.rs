@@ -23,13 +23,11 @@ use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs}
 use crate::runs::Told;
 use crate::store::budget::PlacesBudgetRecord;
 use crate::volumetric::UnknownRecord;
+use crate::volumetric::motion::{NamedPoint, Ready};
 use crate::volumetric::verify::VolumetricVerified;
-use crate::volumetric::{GEOMETRY, Mover, VerifyBy, VolumetricCalibrated, WarmUp};
+use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricCalibrated, WarmUp};
 use crate::{Failure, Machine};
 use machine::records::Store;
-
-/// How long the tool is seen to stand at its target.
-const STAND: Duration = Duration::from_millis(200);
 
 /// Starts the machine, zeroes it, runs `procedure`, switches off. What `prepare` refuses is refused
 /// when the devices have said who they are and before anything moves; what it made ready goes to
@@ -271,17 +269,6 @@ fn mm(point: Point) -> [f64; 3] {
     Axis::ALL.map(|axis| point.along(axis).mm())
 }
 
-/// Where some of the three axes are told to go.
-pub(super) struct NamedPoint([Option<Metres>; 3]);
-
-impl NamedPoint {
-    /// The whole point: the axes that are not named stay at `rest`, where the zero leaves them.
-    pub(super) fn from(&self, rest: [Metres; 3]) -> Point {
-        let at = |k: usize| self.0[k].unwrap_or(rest[k]);
-        Point::new(at(0), at(1), at(2))
-    }
-}
-
 /// The targets of a move of three axes.
 pub(super) fn targets(args: &MoveArgs) -> Result<NamedPoint, Failure> {
     let mut target: [Option<Metres>; 3] = [None; 3];
@@ -304,62 +291,42 @@ pub(super) fn targets(args: &MoveArgs) -> Result<NamedPoint, Failure> {
     Ok(NamedPoint(target))
 }
 
-/// Whether the axes may go to `target`; the correction reaches no farther than the volume.
-pub(super) fn refuse_unreachable(
-    machine: &mut Machine,
-    target: Point,
-    is_corrected: bool,
-) -> Result<(), Failure> {
-    let mut mover = machine.volumetric()?.uncorrected_mover()?;
-    mover.check_target(target)?;
-    if is_corrected {
-        machine.volumetric()?.check(target)?;
-    }
-    Ok(())
-}
-
 pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let named = targets(args)?;
     let ready = |machine: &mut Machine, store: &Store| {
-        let index_mm = machine.volumetric()?.config().zero.index_mm;
-        let target = named.from(index_mm.map(Metres::from_mm));
-        let mover = match args.agreed.uncompensated {
-            true => None,
-            false => Some(stored_mover(machine, store)?),
+        let mut volume = machine.volumetric()?;
+        // Where the zero leaves what is not named.
+        let target = named.from(volume.config().zero.index_mm.map(Metres::from_mm));
+        let ready = match args.agreed.uncompensated {
+            true => volume.check_target(target, false).map(|()| None),
+            false => volume.ready(store, target).map(Some),
         };
-        refuse_unreachable(machine, target, mover.is_some())?;
-        Ok((mover, target))
+        Ok((ready?, target))
     };
-    let run = |machine: &mut Machine, _: &Store, (mover, target): (Option<Mover>, Point)| {
-        let Some(mut mover) = mover else {
-            return machine.volumetric()?.go_straight(target).map(|()| None);
-        };
-        machine.volumetric()?.correct(&mut mover, true)?;
-        machine
-            .volumetric()?
-            .drive_to(&mut mover, target, STAND)
-            .map(Some)
+    let run = |machine: &mut Machine, _: &Store, (ready, target): (Option<Ready>, Point)| {
+        let mut volume = machine.volumetric()?;
+        match ready {
+            Some(ready) => volume.go_corrected(ready, target).map(Some),
+            None => volume.go_straight(target).map(|()| None),
+        }
     };
     let machine = &args.machine;
     let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
-    let Some(live) = live else {
-        let text = "NOT CORRECTED: the axes went by their encoders alone";
-        return output.result(text, &json!({"corrected": false, "counters": counters}));
-    };
-    let value =
-        json!({"corrected": live.corrected, "axes": live_value(&live), "counters": counters});
-    output.result(&live_text(&live), &value)
+    let told = live.as_ref().map_or_else(by_encoders, moved);
+    output.told(told, counters)
 }
 
-fn stored_mover(machine: &mut Machine, store: &Store) -> Result<Mover, Failure> {
-    let mover = machine.volumetric()?.stored_mover(store)?;
-    mover.ok_or_else(never_measured)
+fn by_encoders() -> Told {
+    Told {
+        text: "NOT CORRECTED: the axes went by their encoders alone".into(),
+        value: json!({"corrected": false}),
+    }
 }
 
-/// Three axes that nothing corrects.
-pub(crate) fn never_measured() -> Failure {
-    Failure::NotCalibrated {
-        what: "the errors of x, y and z were never measured".into(),
+pub(super) fn moved(live: &Live) -> Told {
+    Told {
+        text: live_text(live),
+        value: json!({"corrected": live.corrected, "axes": live_value(live)}),
     }
 }
 

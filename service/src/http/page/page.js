@@ -12,6 +12,7 @@ const byId = (id) => document.getElementById(id);
 let token = null;
 let renewing = null;
 const plans = new Map();
+const together = new Set();
 
 async function ask(method, path, body) {
   const headers = { "content-type": "application/json", "truestage-client": "page" };
@@ -40,6 +41,33 @@ function showMachine(machine) {
   const other = machine.lease && !token;
   byId("take").textContent = other ? `Take control from ${machine.lease.name}` : "Take control";
   byId("take").dataset.force = other ? "yes" : "";
+  showGroups(machine.groups);
+}
+
+// Axes that never move by themselves have one form for all of them.
+function showGroups(groups) {
+  for (const { name, axes, targets } of groups) {
+    if (targets.every((it) => axes.includes(it)) || byId(`group-${name}`)) continue;
+    const made = byId("group-card").content.cloneNode(true).querySelector("article");
+    made.id = `group-${name}`;
+    made.querySelector("h3").textContent = `${name} · ${axes.join(", ")}`;
+    const inputs = targets.map((target) => {
+      const [label, input] = [element("label", `${target} `), document.createElement("input")];
+      [input.size, input.name, input.placeholder] = [10, target, "stays"];
+      label.append(input);
+      made.querySelector(".parts").append(label, " ");
+      return input;
+    });
+    made.querySelector("form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      const named = inputs.map((it) => [it.name, it.value.trim()]).filter(([, text]) => text);
+      const [uncompensated, align] = [".uncompensated", ".align"].map((it) => agreed(made.querySelector(it)));
+      told(ask("POST", "/v1/motions", { targets: Object.fromEntries(named), uncompensated, align }));
+    });
+    byId("axes").prepend(made);
+    axes.forEach((axis) => together.add(axis));
+    showControl();
+  }
 }
 
 function showControl() {
@@ -159,7 +187,9 @@ function showAxes(list) {
     const [low, high] = turns ? [0, 360] : [axis.soft_min.value, axis.soft_max.value];
     const at = axis.encoder ? axis.encoder.value : low;
     bar.value = (turns ? ((at % 360) + 360) % 360 : at - low) / (high - low);
-    for (const it of shown.querySelectorAll(".jogs")) it.hidden = turns;
+    const never = together.has(axis.name);
+    for (const it of shown.querySelectorAll(".jogs")) it.hidden = turns || never;
+    shown.querySelector(".go").hidden = never;
     if (turns) shown.querySelector(".go input").placeholder = "90deg";
     bar.title = turns ? "turns endlessly" : `${low} to ${high} ${axis.soft_min.unit}`;
     const facts = {

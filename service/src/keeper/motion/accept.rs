@@ -63,7 +63,13 @@ impl Keeper {
             let what = format!("{ACTIVE_MAX} motions are under way or wait");
             return Err(Problem::new(Code::Busy, what, "wait for the end of one"));
         }
-        let legs = request.targets.iter().map(|(axis, target)| {
+        let together = self.together_of(request)?;
+        if request.align && together.is_none() {
+            let what = "`align` is for what a camera sees: platforms";
+            return Err(Problem::new(Code::NotOffered, what, "leave it out"));
+        }
+        let single = request.targets.iter().filter(|_| together.is_none());
+        let legs = single.map(|(axis, target)| {
             Ok(Leg {
                 at: self.place(axis)?,
                 target: *target,
@@ -89,12 +95,16 @@ impl Keeper {
             dead_man: dead_man.map(|it| (it, now + it)),
             jog: None,
             legs,
+            together,
             phase: Phase::Queued,
         })
     }
 
     /// What each axis is sent, and how fast; everything is judged before anything moves.
     pub(super) fn plan_legs(&self, machine: &Machine, motion: &mut Motion) -> Result<(), Problem> {
+        if let Some(together) = &motion.together {
+            return self.judge_together(machine, together);
+        }
         let wanted = motion.wanted;
         let is_round = |leg: &Leg| matches!(leg.going, Some(Going::Round(_)));
         motion.legs.iter_mut().try_for_each(|leg| {
@@ -122,7 +132,11 @@ impl Keeper {
             IfMoving::Queue => Ok(()),
             IfMoving::Refuse => {
                 motion.axes().try_for_each(|at| self.require_free(at))?;
-                self.require_unclaimed(motion)
+                self.require_unclaimed(motion)?;
+                match motion.together {
+                    Some(_) => self.require_no_run(),
+                    None => Ok(()),
+                }
             }
             IfMoving::Supersede => {
                 for at in motion.axes() {

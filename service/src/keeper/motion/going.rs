@@ -42,12 +42,8 @@ impl Going {
             (Mechanics::Turning(_), Coordinate::Angle(angle)) => {
                 round(machine, seat, (angle, wanted)).map(Self::Round)
             }
-            (Mechanics::Linear(_), Coordinate::Angle(_)) => {
-                Err(other_unit(seat, "goes along a way", "a length: \"12.5mm\""))
-            }
-            (Mechanics::Turning(_), Coordinate::Length(_)) => {
-                Err(other_unit(seat, "turns", "an angle: \"12.5deg\""))
-            }
+            (Mechanics::Linear(_), Coordinate::Angle(_)) => Err(other_unit(&seat.name, false)),
+            (Mechanics::Turning(_), Coordinate::Length(_)) => Err(other_unit(&seat.name, true)),
         }?;
         if seat.is_enabled(machine) {
             return Ok(planned);
@@ -124,8 +120,13 @@ impl Going {
     }
 }
 
-fn other_unit(seat: &Seat, what_it_does: &str, expected: &str) -> Problem {
-    let what = format!("`targets.{}`: the axis {what_it_does}", seat.name);
+/// That the target `name` is a length, or an angle, and was given as the other.
+pub(super) fn other_unit(name: &str, turns: bool) -> Problem {
+    let (what_it_does, expected) = match turns {
+        true => ("turns", "an angle: \"12.5deg\""),
+        false => ("goes along a way", "a length: \"12.5mm\""),
+    };
+    let what = format!("`targets.{name}`: it {what_it_does}");
     Problem::new(Code::NotOffered, what, format!("give {expected}"))
 }
 
@@ -140,16 +141,11 @@ fn along(
     let course = match (seat.moved, agreed.uncompensated) {
         (Moved::Together, _) => {
             let what = format!("axis {axis} moves only together with others, and not by itself");
-            let help = "use `truestage move` while the service is not running";
-            return Err(Problem::new(Code::NotOffered, what, help));
-        }
-        (Moved::CorrectedTogether, false) => {
-            let what = format!("axis {axis} is corrected only together with the other two");
-            let help = "ask for it with \"uncompensated\": true, or use `truestage move`";
+            let help = "ask where all of them shall be together: \"targets\": {\"x\": \"1mm\", \"theta\": \"20arcsec\"}";
             return Err(Problem::new(Code::NotOffered, what, help));
         }
         (Moved::CorrectedTogether | Moved::Alone, true) => &alone,
-        (Moved::Alone, false) => &own.course,
+        (Moved::CorrectedTogether | Moved::Alone, false) => &own.course,
     };
     let mut planned = course.plan(machine, axis, target)?;
     planned.corrected.require(axis, target, agreed)?;
@@ -177,7 +173,7 @@ fn round(
     let course = match &seat.mechanics {
         Mechanics::Turning(course) if wanted.agreed.uncompensated => course.uncompensated(),
         Mechanics::Turning(course) => (**course).clone(),
-        Mechanics::Linear(_) => return Err(other_unit(seat, "goes along a way", "a length")),
+        Mechanics::Linear(_) => return Err(other_unit(&seat.name, false)),
     };
     course.require(axis, wanted.agreed)?;
     let here = reading.map_or(Radians::ZERO, |it| it.position);

@@ -8,7 +8,7 @@ use truestage::runs::{Teller, Told};
 use super::super::mechanics::{Mechanics, approach};
 use super::super::seat::Seat;
 use super::going::Going;
-use super::{End, Leg, Motion, Phase};
+use super::{End, Leg, Motion, Phase, together};
 use crate::coordinate::Coordinate;
 use crate::view::{LegView, MotionState, MotionView, ToldView};
 
@@ -26,6 +26,10 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         };
         (seats[leg.at].name.to_string(), view)
     });
+    let axes = match &motion.together {
+        Some(together) => together.legs(),
+        None => legs.collect(),
+    };
     MotionView {
         id: motion.id.to_string(),
         by: motion.by.clone(),
@@ -37,7 +41,8 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         },
         stopped: None,
         cause: None,
-        axes: legs.collect(),
+        axes,
+        told: None,
     }
 }
 
@@ -50,15 +55,20 @@ pub(super) fn ended(
     end: End,
 ) -> MotionView {
     let mut view = view(motion, seats);
+    if let Some(together) = &motion.together {
+        view.axes = together::ended(together, seats, machine);
+        let told = together.moved().and_then(|it| it.told.clone());
+        view.told = told
+            .filter(|_| matches!(end, End::Done))
+            .map(ToldView::from);
+    }
     for leg in &motion.legs {
         let seat = &seats[leg.at];
         let Some(shown) = view.axes.get_mut(&*seat.name) else {
             continue;
         };
         let sample = seat.sample(machine);
-        let place = sample.place.or(sample.encoder);
-        shown.position = place.map(Coordinate::shown);
-        shown.encoder = sample.encoder.map(Coordinate::shown);
+        (shown.position, shown.encoder) = seat.place_shown(machine);
         shown.standard_uncertainty = sample.standard_uncertainty.map(Coordinate::small);
         shown.told = match (&end, teller) {
             (End::Done, Some(teller)) => told(leg, seat, machine, teller).map(ToldView::from),
