@@ -2,6 +2,7 @@
 
 mod calibrations;
 mod journals;
+mod paths;
 mod runs;
 
 use core::time::Duration;
@@ -25,6 +26,7 @@ use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
 use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
+pub(crate) use paths::PathJudges;
 
 /// How often whoever waits looks.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
@@ -44,6 +46,8 @@ struct Shared {
     store: Store,
     /// Who makes a page of a journal.
     page: Option<Page>,
+    /// Who judges paths, by what follows them.
+    paths: PathJudges,
 }
 
 /// Makes a page of a journal.
@@ -76,7 +80,7 @@ impl Desk {
         fixed: Arc<Fixed>,
         ledger: Ledger,
         store: Store,
-        page: Option<Page>,
+        (page, paths): (Option<Page>, PathJudges),
     ) -> Self {
         let shared = Shared {
             board,
@@ -84,6 +88,7 @@ impl Desk {
             ledger: Mutex::new(ledger),
             store,
             page,
+            paths,
         };
         Self {
             letters,

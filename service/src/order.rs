@@ -1,6 +1,7 @@
 //! What goes to the machine's thread, and what comes back.
 
 use tokio::sync::oneshot;
+use truestage::runs::JudgedPath;
 
 use crate::problem::Problem;
 use crate::request::{
@@ -24,7 +25,12 @@ pub(crate) enum Order {
     /// Switches an axis on or off.
     Power { axis: String, on: bool },
     /// A run under the name that it is to have.
-    Plan { id: String, request: RunRequest },
+    Plan {
+        id: String,
+        request: RunRequest,
+        /// What it follows, where it is a path.
+        path: Option<JudgedPath>,
+    },
     /// A planned run begins.
     Start { run: String },
     /// A run ends.

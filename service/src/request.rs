@@ -162,11 +162,19 @@ pub enum RunKind {
     Verify,
     /// Take down what the detectors of three axes read: from now on, a displacement is what has changed since.
     Reference,
+    /// Follow a path of three axes, given in `path`.
+    Path,
 }
 
 impl RunKind {
     /// All of them.
-    pub(crate) const ALL: [Self; 4] = [Self::Zero, Self::Calibrate, Self::Verify, Self::Reference];
+    pub(crate) const ALL: [Self; 5] = [
+        Self::Zero,
+        Self::Calibrate,
+        Self::Verify,
+        Self::Reference,
+        Self::Path,
+    ];
 
     /// What procedures call it.
     pub(crate) const fn stage(self) -> Stage {
@@ -175,6 +183,7 @@ impl RunKind {
             Self::Calibrate => Stage::Calibrate,
             Self::Verify => Stage::Verify,
             Self::Reference => Stage::Reference,
+            Self::Path => Stage::Job,
         }
     }
 }
@@ -192,9 +201,14 @@ pub struct RunRequest {
     /// Calibrate: save although the same place measured at the beginning and at the end differs too much.
     #[serde(default)]
     pub accept_drift: bool,
-    /// Verify: without the calibration, the stage as found.
+    /// Verify: without the calibration, the stage as found. Path: by the encoders alone.
     #[serde(default)]
     pub uncompensated: bool,
+    /// Path: its rows as a CSV file has them, a heading and a row for each moment: `time_s,x_mm,y_mm,z_mm`. Between
+    /// the rows runs a cubic spline, at rest at both ends. At most 600 s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 1000000)]
+    pub path: Option<String>,
     /// Starts it at once.
     #[serde(default)]
     pub start: bool,
@@ -208,6 +222,7 @@ impl RunRequest {
             axis: axis.map(str::to_owned),
             accept_drift: false,
             uncompensated: false,
+            path: None,
             start: true,
         }
     }

@@ -8,8 +8,8 @@ use std::cell::RefCell;
 use std::io;
 use std::path::PathBuf;
 use std::rc::Rc;
-use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use machine::attend;
@@ -19,7 +19,7 @@ use truestage::runs::{Found, Group, Teller};
 use truestage::{Failure, Machine, groups};
 use wire::cia402::PowerState;
 
-use crate::desk::{Desk, Page};
+use crate::desk::{Desk, Page, PathJudges};
 use crate::keeper::{
     Attending, Job, Keeper, Mechanics, Mode, RunTask, answer, cause_of, fixed, seats,
 };
@@ -92,10 +92,10 @@ impl Service {
             .name("machine".into())
             .spawn(move || keep(open, inbox, input, &told))?;
         match ready.recv() {
-            Ok((fixed, store, page)) => {
+            Ok((fixed, store, of_desk)) => {
                 let folder = store.root().join("service");
                 let ledger = Ledger::open(&folder)?;
-                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store, page);
+                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store, of_desk);
                 Ok(Self {
                     scribe: Scribe::start(desk.clone(), folder)?,
                     desk,
@@ -145,7 +145,7 @@ impl Service {
     }
 }
 
-type Told = Sender<(Arc<Fixed>, Store, Option<Page>)>;
+type Told = Sender<(Arc<Fixed>, Store, (Option<Page>, PathJudges))>;
 
 /// All that the machine's thread does.
 fn keep(
@@ -163,6 +163,7 @@ fn keep(
     let groups = groups(machine.config());
     let fixed = Arc::new(fixed(&mut machine, &groups)?);
     let seats = seats(&mut machine, &groups)?;
+    let paths = path_judges(&mut machine, &groups)?;
     let mut keeper = Keeper::new(inbox, input, seats, teller.clone());
     keeper.add_groups(&mut machine, groups);
     machine.observe(Box::new(keeper.note_taker()));
@@ -186,12 +187,23 @@ fn keep(
     let _ = told.send((
         fixed,
         kept.store.clone(),
-        kept.teller.as_ref().map(|it| it.page),
+        (kept.teller.as_ref().map(|it| it.page), paths),
     ));
     let ended = kept.live();
     kept.keeper.borrow_mut().dismiss();
     drop(held);
     ended
+}
+
+/// Who judges paths of `machine`.
+fn path_judges(machine: &mut Machine, groups: &[Group]) -> Result<PathJudges, Failure> {
+    let mut judges = PathJudges::new();
+    for group in groups {
+        if let Some(judge) = group.path_judge(machine)? {
+            judges.push((group.name.clone(), Mutex::new(judge)));
+        }
+    }
+    Ok(judges)
 }
 
 /// A machine that is kept.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use truestage::runs::JudgedPath;
 use utoipa::ToSchema;
 
 use crate::problem::Code;
@@ -274,6 +275,42 @@ pub struct RunPlanView {
     pub seconds_at_least: f64,
     /// What a person will be asked to do.
     pub asks: Vec<String>,
+    /// Where a path is farthest from the straight joins of its rows: at corners it swings out.
+    #[serde(default)]
+    pub departure: Option<DepartureView>,
+}
+
+impl RunPlanView {
+    /// Of a path that was judged.
+    pub(crate) fn of_path(judged: &JudgedPath) -> Self {
+        let departure = &judged.path.departure;
+        let place = departure.place.iter();
+        Self {
+            points: judged.path.points.len() as u64,
+            travel: Some(Quantity::mm(judged.travel)),
+            seconds_at_least: judged.takes.as_secs_f64(),
+            asks: Vec::new(),
+            departure: Some(DepartureView {
+                size: Quantity::mm(departure.size),
+                at_s: departure.at_s,
+                lines: departure.lines.to_vec(),
+                place: place.map(|it| Quantity::mm(*it)).collect(),
+            }),
+        }
+    }
+}
+
+/// Where a path is farthest from the straight line between the two rows that it runs between.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DepartureView {
+    /// How far.
+    pub size: Quantity,
+    /// When, in seconds from its beginning.
+    pub at_s: f64,
+    /// The lines of the two rows, counted from 1.
+    pub lines: Vec<usize>,
+    /// Where it is then, by axis.
+    pub place: Vec<Quantity>,
 }
 
 /// A run.
@@ -283,7 +320,7 @@ pub struct RunView {
     pub id: String,
     /// Who asked for it.
     pub by: String,
-    /// What it is: `zero`, `calibrate`, `verify` or `reference`.
+    /// What it is: `zero`, `calibrate`, `verify`, `reference` or `path`.
     pub kind: crate::request::RunKind,
     /// What is run: an axis, `platform` or `volume`.
     #[serde(default)]

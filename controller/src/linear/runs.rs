@@ -19,6 +19,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    paths: None,
     moves: None,
 };
 

@@ -23,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    paths: None,
     moves: Some(&MOVES),
 };
 

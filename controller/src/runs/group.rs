@@ -3,6 +3,7 @@
 use machine::Stage;
 use machine::records::Store;
 
+use super::path::PathJudge;
 use super::person::Person;
 use super::task::{Found, Planned, Task, Work};
 use super::teller::Teller;
@@ -57,9 +58,14 @@ pub(crate) struct GroupRuns {
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
     pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
+    /// Who judges paths that it follows, where it follows some.
+    pub(crate) paths: Option<MakesPathJudge>,
     /// How it is moved as one, where it is.
     pub(crate) moves: Option<&'static GroupMoves>,
 }
+
+/// Makes who judges paths.
+pub(crate) type MakesPathJudge = fn(&mut Machine) -> Result<PathJudge, Failure>;
 
 /// Which calibration each axis uses.
 pub(crate) type InUse = Vec<(String, Option<String>)>;
@@ -146,6 +152,14 @@ impl Group {
         store: &Store,
     ) -> Result<Vec<(String, Option<String>)>, Failure> {
         (self.runs.load)(machine, store, &self.name)
+    }
+
+    /// Who judges paths that it follows; `None` where it follows none.
+    ///
+    /// # Errors
+    /// When its axes are not made for it.
+    pub fn path_judge(&self, machine: &mut Machine) -> Result<Option<PathJudge>, Failure> {
+        self.runs.paths.map(|it| it(machine)).transpose()
     }
 
     fn moves(&self) -> Result<&'static GroupMoves, Failure> {

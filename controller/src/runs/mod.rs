@@ -5,12 +5,14 @@
 //! command line: `runs.rs` in its folder. [`groups`](crate::groups) lists what a machine has.
 
 mod group;
+mod path;
 mod person;
 mod task;
 mod teller;
 mod together;
 
 pub use group::{Group, Moved};
+pub use path::{JudgedPath, PathJudge};
 pub use person::{Person, Question};
 pub use task::{Found, Planned, Task, Travel};
 pub use teller::{Teller, Told};

@@ -9,6 +9,7 @@ use machine::records::Store;
 use serde_json::Value;
 use units::{Metres, Radians};
 
+use super::path::JudgedPath;
 use super::person::Person;
 use super::teller::{Teller, Told};
 use crate::connected::Machine;
@@ -16,7 +17,7 @@ use crate::failure::Failure;
 use crate::run::CalibrateOptions;
 
 /// A run that is to be done.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Task {
     /// Which.
     pub stage: Stage,
@@ -24,8 +25,10 @@ pub struct Task {
     pub resume: Option<PathBuf>,
     /// Calibrate: store although the same place differs too much between beginning and end.
     pub accept_drift: bool,
-    /// Verify: as found, without the calibration.
+    /// Verify: as found, without the calibration. A path: by the encoders alone.
     pub uncompensated: bool,
+    /// The path that is followed, where it is one.
+    pub path: Option<JudgedPath>,
 }
 
 impl Task {

@@ -41,6 +41,7 @@ mod memory;
 pub(crate) mod memory_import;
 pub(crate) mod motion;
 mod moves;
+pub(crate) mod path;
 pub(crate) mod record;
 pub(crate) mod reference;
 mod runs;

@@ -14,6 +14,7 @@ use crate::memories::Memory;
 use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, PartMoved, Place, Teller};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::moves::check_in;
+use crate::volumetric::path::PathFollowed;
 use crate::volumetric::settings::work_volume;
 use crate::volumetric::{
     GEOMETRY, Mover, VolumetricCorrection, VolumetricFailure, VolumetricRecords, VolumetricTeller,
@@ -81,20 +82,44 @@ impl WorkVolume<'_> {
     /// # Errors
     /// When nothing was measured, what is stored cannot be applied, or the target is outside.
     pub(crate) fn ready(&mut self, store: &Store, target: Point) -> Result<Ready, Failure> {
-        let (state, records) = self.state(store)?.ok_or_else(never_measured)?;
-        let last = self.last().0.take().map(|it| it.0);
-        let last = last.filter(|it| it.records == records);
-        let mut ready = match last {
-            Some(last) => last,
-            None => {
-                let correction = VolumetricCorrection::new(self.core.config, state)?;
-                let mover = self.mover(Box::new(correction))?;
-                Ready { mover, records }
-            }
-        };
+        let mut ready = self.corrected_loop(store)?;
         ready.mover.check_target(target)?;
         self.check(target)?;
         Ok(ready)
+    }
+
+    /// The loop that all that is stored corrects: the last one, while that is what it knows.
+    fn corrected_loop(&mut self, store: &Store) -> Result<Ready, Failure> {
+        let (state, records) = self.state(store)?.ok_or_else(never_measured)?;
+        let last = self.last().0.take().map(|it| it.0);
+        let last = last.filter(|it| it.records == records);
+        if let Some(last) = last {
+            return Ok(last);
+        }
+        let correction = VolumetricCorrection::new(self.core.config, state)?;
+        let mover = self.mover(Box::new(correction))?;
+        Ok(Ready { mover, records })
+    }
+
+    /// Follows `points`, which were judged, corrected by all that is stored or not at all.
+    ///
+    /// # Errors
+    /// When nothing was measured, or what is stored cannot be applied; those of [`Self::follow`].
+    pub(crate) fn follow_stored(
+        &mut self,
+        store: &Store,
+        points: Vec<Vec<Metres>>,
+        is_corrected: bool,
+    ) -> Result<PathFollowed, Failure> {
+        if !is_corrected {
+            let mut mover = self.uncorrected_mover()?;
+            return self.follow(&mut mover, points, false, || {});
+        }
+        let Ready { mut mover, records } = self.corrected_loop(store)?;
+        let followed = self.follow(&mut mover, points, true, || {})?;
+        let last = followed.last.map(|live| (Ready { mover, records }, live));
+        self.last().0 = last;
+        Ok(followed)
     }
 
     /// Moves the tool to `target`, and says what the correction was there.

@@ -1,12 +1,16 @@
 //! What is run on three axes for whoever keeps a machine: all of them together, and a person sets lines up.
 
+use std::path::Path;
+
 use machine::Stage;
 use serde_json::json;
 
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::runs::{Found, Group, GroupRuns, Moved, Part, Planned, Task, Work};
+use crate::runs::{
+    Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
+};
 use crate::volumetric::asked::Asking;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::handle::WorkVolume;
@@ -23,12 +27,14 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
         Stage::Calibrate,
         Stage::Verify,
         Stage::Reference,
+        Stage::Job,
     ],
     resumed: |_, _, stage| stage == Stage::Calibrate,
     refuse,
     planned,
     perform,
     load: |_, _, _| Ok(Vec::new()),
+    paths: Some(paths),
     moves: Some(&MOVES),
 };
 
@@ -89,11 +95,47 @@ impl WorkVolume<'_> {
 
 fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
     match task.stage {
-        Stage::Zero | Stage::Job => zero(work),
+        Stage::Zero => zero(work),
+        Stage::Job => follow(work, task),
         Stage::Calibrate => calibrate(work, task),
         Stage::Verify => verify(work, task),
         Stage::Reference => reference(work),
     }
+}
+
+/// What a path of a service is called in what is said of it.
+const PATH: &str = "path";
+
+fn paths(machine: &mut Machine) -> Result<PathJudge, Failure> {
+    let judge = machine.volumetric()?.path_judge()?;
+    Ok(PathJudge::new(move |rows, is_corrected| {
+        let path = judge.judge((Path::new(PATH), rows), is_corrected)?;
+        Ok(JudgedPath::new(path, judge.period()))
+    }))
+}
+
+fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
+    let words = work.words::<VolumetricTeller>();
+    let Some(judged) = &task.path else {
+        return Err(Failure::Usage {
+            what: "a path without rows".into(),
+            help: "give them".into(),
+        });
+    };
+    let (points, is_corrected) = (judged.path.points.clone(), !task.uncompensated);
+    let mut volume = work.machine.volumetric()?;
+    let followed = volume.follow_stored(work.store, points, is_corrected)?;
+    let corrected = followed.corrected.as_ref();
+    Ok(Found {
+        figures: json!({
+            "points": followed.count,
+            "corrected": corrected.is_some(),
+            "largest_correction_um": corrected.map(|it| it.largest.map(|it| it.um())),
+            "u_max_um": corrected.map(|it| it.u.map(|it| it.um())),
+        }),
+        told: words.map(|it| (it.followed)(&followed, &judged.path.departure)),
+        bad: None,
+    })
 }
 
 fn zero(work: Work<'_>) -> Result<Found, Failure> {

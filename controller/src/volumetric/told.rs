@@ -1,9 +1,10 @@
 //! What three axes gave, in the words of the command line.
 
-use machine::engine::Live;
+use machine::engine::{Departure, Live};
 
 use crate::runs::Told;
 use crate::volumetric::VolumetricCalibrated;
+use crate::volumetric::path::PathFollowed;
 use crate::volumetric::reference::VolumetricReferenced;
 use crate::volumetric::verify::VolumetricVerified;
 
@@ -20,4 +21,6 @@ pub struct VolumetricTeller {
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
     /// A corrected move that was made, by its last period.
     pub moved: fn(live: &Live) -> Told,
+    /// A path that was followed, and where it was farthest from the straight joins of its rows.
+    pub followed: fn(followed: &PathFollowed, departure: &Departure) -> Told,
 }

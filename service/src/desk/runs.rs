@@ -4,6 +4,8 @@ use core::time::Duration;
 use std::thread;
 use std::time::Instant;
 
+use truestage::runs::JudgedPath;
+
 use super::{Desk, LOOK_EVERY};
 use crate::order::Order;
 use crate::problem::{Code, Problem};
@@ -18,12 +20,21 @@ impl Desk {
     /// When it is refused; nothing has moved then.
     pub fn plan_run(&self, caller: &Caller, request: &RunRequest) -> Result<String, Problem> {
         let id = self.next_run();
-        let order = Order::Plan {
-            id: id.clone(),
-            request: request.clone(),
-        };
+        let order = Self::plan_order(&id, request, self.judge_path(request)?);
         self.done(caller, order)?;
         Ok(id)
+    }
+
+    /// The rows of a path stay here.
+    pub(crate) fn plan_order(id: &str, request: &RunRequest, path: Option<JudgedPath>) -> Order {
+        Order::Plan {
+            id: id.to_owned(),
+            request: RunRequest {
+                path: None,
+                ..request.clone()
+            },
+            path,
+        }
     }
 
     pub(crate) fn next_run(&self) -> String {

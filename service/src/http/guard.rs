@@ -25,8 +25,10 @@ use crate::request::Caller;
 
 /// So large a request may be, in bytes.
 const BODY_MAX: usize = 64 << 10;
+/// So large one with the rows of a path.
+const PATH_MAX: usize = 1 << 20;
 /// So much of a larger one is heard, so that its answer is heard, too.
-const HEARD_MAX: usize = 1 << 20;
+const HEARD_MAX: usize = 2 << 20;
 /// How long a body may take to come: its connection has one of the places meanwhile.
 const BODY_TIME: Duration = Duration::from_secs(10);
 /// So long a name of a client may be.
@@ -115,7 +117,11 @@ pub(super) async fn guard(
     let admitted = guarded.admit(&request);
     let (mut parts, body) = request.into_parts();
     // Who is answered before he has said all may never hear it.
-    let whole = timeout(BODY_TIME, whole(body)).await;
+    let most = match admitted.is_ok() && parts.uri.path() == "/v1/runs" {
+        true => PATH_MAX,
+        false => BODY_MAX,
+    };
+    let whole = timeout(BODY_TIME, whole(body, most)).await;
     let whole = whole.unwrap_or_else(|_| {
         let what = format!("the request had not come as a whole after {BODY_TIME:?}");
         Err(Problem::new(Code::BadRequest, what, "send it faster"))
@@ -133,7 +139,7 @@ pub(super) async fn guard(
 }
 
 /// All of a body, also where nobody asks for it.
-async fn whole(body: axum::body::Body) -> Result<Vec<u8>, Problem> {
+async fn whole(body: axum::body::Body, most: usize) -> Result<Vec<u8>, Problem> {
     let mut stream = body.into_data_stream();
     let (mut whole, mut length) = (Vec::new(), 0);
     while let Some(part) = stream.next().await {
@@ -142,14 +148,14 @@ async fn whole(body: axum::body::Body) -> Result<Vec<u8>, Problem> {
         if length > HEARD_MAX {
             break;
         }
-        if length <= BODY_MAX {
+        if length <= most {
             whole.extend_from_slice(&part);
         }
     }
-    if length <= BODY_MAX {
+    if length <= most {
         return Ok(whole);
     }
-    let what = format!("a request of more than {} kB", BODY_MAX >> 10);
+    let what = format!("a request of more than {} kB", most >> 10);
     Err(Problem::new(Code::TooLarge, what, ""))
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use machine::{Machine, Stage};
 use serde_json::json;
-use truestage::runs::{self, Found, Group};
+use truestage::runs::{self, Found, Group, JudgedPath};
 
 use super::mechanics::Mechanics;
 use super::seat::Task as SeatTask;
@@ -17,10 +17,12 @@ use super::{Job, Keeper, Mode};
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::snapshot::CalibrationInUse;
-use crate::view::{Cause, RunState, RunView, Stopped, ToldView};
+use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
 
 /// So many runs are kept in the snapshot.
 const KEPT: usize = 64;
+/// So many paths may wait.
+const PATHS: usize = 4;
 
 /// What the machine's thread is to do for a run.
 #[derive(Clone, Debug)]
@@ -33,6 +35,8 @@ pub(crate) struct Task {
     pub(crate) is_resumed: bool,
     /// The journal that it goes on with.
     pub(crate) resume: Option<PathBuf>,
+    /// The path that it follows.
+    path: Option<JudgedPath>,
 }
 
 impl Task {
@@ -43,6 +47,7 @@ impl Task {
             resume: self.resume.clone(),
             accept_drift: self.request.accept_drift,
             uncompensated: self.request.uncompensated,
+            path: self.path.clone(),
         }
     }
 }
@@ -118,6 +123,16 @@ impl Runs {
         self.published = None;
     }
 
+    /// Paths are long, and wait in memory until they are followed.
+    fn require_room_for(&self, path: Option<&JudgedPath>) -> Result<(), Problem> {
+        let waiting = self.kept.iter().filter(|it| it.task.path.is_some());
+        if path.is_none() || waiting.count() < PATHS {
+            return Ok(());
+        }
+        let what = format!("{PATHS} paths are planned or under way");
+        Err(Problem::new(Code::Busy, what, "start them, or abort one"))
+    }
+
     pub(super) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
         self.published = None;
         let found = self.kept.iter_mut().find(|it| *it.task.id == *id);
@@ -144,9 +159,12 @@ impl Keeper {
         id: &str,
         by: &str,
         request: &RunRequest,
+        path: Option<JudgedPath>,
     ) -> Result<(), Problem> {
         let at = self.group_of(request.axis.as_deref())?;
         let plan = self.plan_of(request.kind, at)?;
+        let plan = path.as_ref().map_or(plan, RunPlanView::of_path);
+        self.runs.require_room_for(path.as_ref())?;
         let grouped = &self.groups[at];
         let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let task = Task {
@@ -155,6 +173,7 @@ impl Keeper {
             is_resumed: grouped.is_resumed(request.kind),
             group,
             resume: None,
+            path,
         };
         task.group.refuse(&task.of_procedure())?;
         let of = (task.group.name.as_str(), task.group.axes.clone());
@@ -391,6 +410,9 @@ impl Keeper {
             return;
         };
         change(&mut run.view);
+        if run.view.state.is_end() {
+            run.task.path = None;
+        }
         let data = json!(run.view);
         self.events.push("run", id, data);
     }

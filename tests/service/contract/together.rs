@@ -1,11 +1,12 @@
 //! Axes that move as one: a platform, and three axes that are corrected together. The contract is that of every motion.
 
+use core::time::Duration;
 use std::path::Path;
 
 use mock_bus::fault::Fault;
 use service::{
     AxisState, Code, Coordinate, Event, IfMoving, MachineState, MotionState, MotionView,
-    MoveRequest, RunKind, RunState, StopMode,
+    MoveRequest, RunKind, RunRequest, RunState, StopMode,
 };
 use tests::volume::{Volume, good};
 use tests::{Edit, UVW, VOLUMETRIC};
@@ -285,76 +286,165 @@ fn off_um(bed: &Bed<'_>, mm: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn three_axes_that_are_corrected_together_move_as_one() {
+fn three_axes_that_are_corrected_together_move_as_one_and_follow_paths() {
     with_known_volume(|bed| {
-        let point = MoveRequest {
-            targets: [("x", 60.0), ("y", 40.0), ("z", 30.0)]
-                .map(|(it, mm)| (it.to_owned(), length(mm)))
-                .into(),
-            ..compensated("x", 0.0)
-        };
-        let view = bed.done(&point);
-        let leg = &view.axes["x"];
-        assert_eq!(leg.corrected, "yes");
-        let (position, encoder) = (at(&view, "x"), leg.encoder.as_ref().unwrap().value);
-        assert!((position - 60.0).abs() < 0.3e-3, "{view:?}");
-        let u_um = leg
-            .standard_uncertainty
-            .as_ref()
-            .expect("it is known")
-            .value;
-        assert!((position - encoder).abs() > 1e-3 && u_um < 1.0, "{view:?}");
-        let off = off_um(bed, [60.0, 40.0, 30.0]);
-        assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
-        let axis = bed.client.axis("x").unwrap();
-        assert!(
-            axis.corrected && axis.standard_uncertainty.is_some(),
-            "{axis:?}"
-        );
-
-        // Line 5: the tool stays where it is, also while the correction is taken up again.
-        let id = bed.begin(&point);
-        let mut farthest = 0.0_f64;
-        while !bed.now(&id).state.is_end() {
-            farthest = farthest.max((bed.encoder_mm("x") - encoder).abs());
-            bed.let_time_pass(0.05);
-        }
-        assert_eq!(bed.now(&id).state, MotionState::Done);
-        assert!(farthest < 0.5e-3, "it went away by {farthest} mm");
-        // What nobody names stays.
-        let view = bed.done(&compensated("z", 20.0));
-        assert!(
-            (view.axes["x"].target.value - 60.0).abs() < 1e-9,
-            "{view:?}"
-        );
-
-        let outside = bed.refused(&compensated("x", 502.0), Code::Refused);
-        assert!(
-            outside.to_string().contains("outside the calibrated"),
-            "{outside}"
-        );
-        bed.refused(&compensated("x", 510.0), Code::SoftLimit);
-        bed.refused(
-            &MoveRequest {
-                align: true,
-                ..point.clone()
-            },
-            Code::Configuration,
-        );
-
-        let id = bed.begin(&compensated("z", 120.0));
-        bed.goes_beyond("z", 40.0);
-        bed.client.stop(&bert(), StopMode::Controlled).unwrap();
-        let view = bed.ended(&id);
-        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
-        assert_eq!(view.stopped.unwrap().by, "bert");
-        assert!(bed.encoder_mm("z") < 110.0);
-        assert_eq!(bed.client.axis("z").unwrap().state, AxisState::Standstill);
-        // Alone by its encoder, and then again together with the others.
-        bed.done(&to("z", 25.0));
-        assert!(!bed.client.axis("z").unwrap().corrected);
-        bed.done(&point);
-        let off = off_um(bed, [60.0, 40.0, 30.0]);
-        assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
+        moves_as_one(bed);
+        follows_paths(bed);
     });
+}
+
+fn moves_as_one(bed: &Bed<'_>) {
+    let point = MoveRequest {
+        targets: [("x", 60.0), ("y", 40.0), ("z", 30.0)]
+            .map(|(it, mm)| (it.to_owned(), length(mm)))
+            .into(),
+        ..compensated("x", 0.0)
+    };
+    let view = bed.done(&point);
+    let leg = &view.axes["x"];
+    assert_eq!(leg.corrected, "yes");
+    let (position, encoder) = (at(&view, "x"), leg.encoder.as_ref().unwrap().value);
+    assert!((position - 60.0).abs() < 0.3e-3, "{view:?}");
+    let u_um = leg
+        .standard_uncertainty
+        .as_ref()
+        .expect("it is known")
+        .value;
+    assert!((position - encoder).abs() > 1e-3 && u_um < 1.0, "{view:?}");
+    let off = off_um(bed, [60.0, 40.0, 30.0]);
+    assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
+    let axis = bed.client.axis("x").unwrap();
+    assert!(
+        axis.corrected && axis.standard_uncertainty.is_some(),
+        "{axis:?}"
+    );
+
+    // Line 5: the tool stays where it is, also while the correction is taken up again.
+    let id = bed.begin(&point);
+    let mut farthest = 0.0_f64;
+    while !bed.now(&id).state.is_end() {
+        farthest = farthest.max((bed.encoder_mm("x") - encoder).abs());
+        bed.let_time_pass(0.05);
+    }
+    assert_eq!(bed.now(&id).state, MotionState::Done);
+    assert!(farthest < 0.5e-3, "it went away by {farthest} mm");
+    // What nobody names stays.
+    let view = bed.done(&compensated("z", 20.0));
+    assert!(
+        (view.axes["x"].target.value - 60.0).abs() < 1e-9,
+        "{view:?}"
+    );
+
+    let outside = bed.refused(&compensated("x", 502.0), Code::Refused);
+    assert!(
+        outside.to_string().contains("outside the calibrated"),
+        "{outside}"
+    );
+    bed.refused(&compensated("x", 510.0), Code::SoftLimit);
+    bed.refused(
+        &MoveRequest {
+            align: true,
+            ..point.clone()
+        },
+        Code::Configuration,
+    );
+
+    let id = bed.begin(&compensated("z", 120.0));
+    bed.goes_beyond("z", 40.0);
+    bed.client.stop(&bert(), StopMode::Controlled).unwrap();
+    let view = bed.ended(&id);
+    assert_eq!(view.state, MotionState::Stopped, "{view:?}");
+    assert_eq!(view.stopped.unwrap().by, "bert");
+    assert!(bed.encoder_mm("z") < 110.0);
+    assert_eq!(bed.client.axis("z").unwrap().state, AxisState::Standstill);
+    // Alone by its encoder, and then again together with the others.
+    bed.done(&to("z", 25.0));
+    assert!(!bed.client.axis("z").unwrap().corrected);
+    bed.done(&point);
+    let off = off_um(bed, [60.0, 40.0, 30.0]);
+    assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
+}
+
+fn path(rows: &str) -> RunRequest {
+    RunRequest {
+        path: Some(format!("time_s,x_mm,y_mm,z_mm\n{rows}")),
+        start: false,
+        ..RunRequest::of(RunKind::Path, None)
+    }
+}
+
+fn follows_paths(bed: &Bed<'_>) {
+    let before = bed.encoder_mm("x");
+    let refused = |request: &RunRequest, code: Code, words: &[&str]| {
+        let problem = bed.client.plan(&anna(), request).unwrap_err();
+        assert_eq!(problem.code, code, "{problem:?}");
+        for word in words {
+            assert!(problem.to_string().contains(word), "{word}: {problem}");
+        }
+    };
+    let slip = path("0,60,40,30\n1,6O,40,30\n");
+    refused(&slip, Code::BadRequest, &["line 3, column x_mm", "`6O`"]);
+    let beyond = path("0,499,40,30\n1,501,40,30\n");
+    refused(&beyond, Code::Refused, &["outside the calibrated"]);
+    let hasty = path("0,60,40,30\n0.1,90,40,30\n");
+    refused(&hasty, Code::Refused, &["axis x"]);
+    refused(
+        &path("0,60,40,30\n601,61,40,30\n"),
+        Code::BadRequest,
+        &["601 s"],
+    );
+    let none = RunRequest {
+        path: None,
+        ..slip.clone()
+    };
+    refused(&none, Code::BadRequest, &["`path`"]);
+    let other = RunRequest {
+        kind: RunKind::Verify,
+        ..slip
+    };
+    refused(&other, Code::BadRequest, &["`path`"]);
+
+    // A corner, which a spline does not turn straight.
+    let corner = path("0,60,40,30\n1,64,40,30\n2,64,44,30\n");
+    let id = bed.client.plan(&anna(), &corner).unwrap();
+    let planned = bed.client.run(&id, Duration::ZERO).unwrap();
+    assert_eq!(
+        (planned.state, planned.plan.points),
+        (RunState::Planned, 1001)
+    );
+    assert_eq!(planned.plan.seconds_at_least, 2.0);
+    let travel = planned.plan.travel.expect("it is known").value;
+    assert!((8.0..9.0).contains(&travel), "{travel} mm");
+    let departure = planned.plan.departure.expect("it turns a corner");
+    assert!(
+        departure.size.value > 0.1 && departure.lines.contains(&3),
+        "{departure:?}"
+    );
+    assert!(
+        (bed.encoder_mm("x") - before).abs() < 1e-3,
+        "nothing moves before it is started"
+    );
+    bed.client.start(&anna(), &id).unwrap();
+    let run = bed.client.run(&id, PATIENCE).unwrap();
+    assert_eq!(run.state, RunState::Done, "{run:?}");
+    assert_eq!(
+        (&run.result["points"], &run.result["corrected"]),
+        (&1001.into(), &true.into())
+    );
+    let off = off_um(bed, [64.0, 44.0, 30.0]);
+    assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
+
+    let id = bed
+        .client
+        .plan(&anna(), &path("0,64,44,30\n60,124,44,30\n"))
+        .unwrap();
+    bed.client.start(&anna(), &id).unwrap();
+    bed.goes_beyond("x", 64.5);
+    bed.client.abort(&bert(), &id).unwrap();
+    let run = bed.client.run(&id, PATIENCE).unwrap();
+    assert_eq!(run.state, RunState::Stopped, "{run:?}");
+    assert_eq!(run.stopped.unwrap().by, "bert");
+    assert!(bed.encoder_mm("x") < 100.0, "it went on");
+    assert_eq!(bed.client.axis("x").unwrap().state, AxisState::Standstill);
+    assert_eq!(bed.client.machine().state, MachineState::Running);
 }

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use compensator::volumetric::{Axis, Point};
-use machine::engine::{CsvPath, Departure, Lack, Live, Validity, read_path};
+use compensator::volumetric::Axis;
+use machine::engine::{CsvPath, Departure};
 use machine::records::short;
 use serde_json::{Value, json};
 use units::Metres;
@@ -19,25 +19,14 @@ use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::memory_args::{ImportArgs, MemoryArgs};
 use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
+use crate::runs::Told;
 use crate::volumetric::MemoryName;
-use crate::volumetric::VolumetricFailure;
-use crate::volumetric::failure::PathRefusal;
 use crate::volumetric::first_part::FirstPart;
 use crate::volumetric::motion::never_measured;
+use crate::volumetric::path::{CorrectedPath, PathFollowed};
 use crate::volumetric::{GEOMETRY, Mover, Remembered, import, memory_pointer};
 use crate::{Failure, Machine};
 use machine::records::Store;
-
-/// How a path was followed.
-struct Followed {
-    count: usize,
-    corrected: Option<CorrectedPath>,
-    timing: String,
-    /// How the loop's thread was scheduled.
-    thread: String,
-    /// What later parts are made with, when this was the first.
-    kept: Option<Remembered>,
-}
 
 /// What drives a path, and what is recorded meanwhile.
 struct Ready {
@@ -59,7 +48,8 @@ pub(crate) fn run(
         return Err(never_measured());
     }
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
-    let path = judged(&mut session.machine, (file, &path), !uncompensated)?;
+    let judge = session.machine.volumetric()?.path_judge()?;
+    let path = judge.judge((file, &path), !uncompensated)?;
     output.note(&before_it_moves(file, &path));
     let CsvPath { points, departure } = path;
     let ready = |machine: &mut Machine, store: &Store| {
@@ -75,21 +65,13 @@ pub(crate) fn run(
         Ok(Ready { mover, part: None })
     };
     let follow =
-        |machine: &mut Machine, store: &Store, ready| followed(machine, store, ready, points);
-    let (followed, counters) = zeroed_volume(session, ready, follow)?;
-    let said = match &followed.corrected {
-        Some(corrected) => corrected.text(),
-        None => "NOT CORRECTED: by the encoders alone".into(),
-    };
-    let (count, timing) = (followed.count, &followed.timing);
-    let mut text = format!("{count} points followed, {said}\n{timing}");
-    let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
-                           "largest_departure": departure_value(&departure),
-                           "thread": followed.thread, "counters": counters});
-    if let Some(corrected) = &followed.corrected {
-        corrected.write_into(&mut value);
-    }
-    if let Some(kept) = &followed.kept {
+        |machine: &mut Machine, store: &Store, ready| follow_part(machine, store, ready, points);
+    let ((path, kept), counters) = zeroed_volume(session, ready, follow)?;
+    let Told {
+        mut text,
+        mut value,
+    } = followed(&path, &departure);
+    if let Some(kept) = &kept {
         text += &format!(
             "\nthe errors that the detectors saw were not corrected in this part; {} keeps them: \
              all later parts are made with them\n{}",
@@ -98,7 +80,26 @@ pub(crate) fn run(
         );
         value["memory"] = kept_value(kept);
     }
-    output.result(&text, &value)
+    output.told(Told { text, value }, counters)
+}
+
+/// What came of a path.
+pub(super) fn followed(followed: &PathFollowed, departure: &Departure) -> Told {
+    let said = match &followed.corrected {
+        Some(corrected) => corrected_text(corrected),
+        None => "NOT CORRECTED: by the encoders alone".into(),
+    };
+    let (count, timing) = (followed.count, &followed.timing);
+    let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
+                           "largest_departure": departure_value(departure),
+                           "thread": followed.thread});
+    if let Some(corrected) = &followed.corrected {
+        write_corrected(corrected, &mut value);
+    }
+    Told {
+        text: format!("{count} points followed, {said}\n{timing}"),
+        value,
+    }
 }
 
 /// Says what would be driven; nothing is connected.
@@ -114,7 +115,8 @@ pub(crate) fn only_judged(
     if is_corrected && store.active(GEOMETRY)?.current.is_none() {
         return Err(never_measured());
     }
-    let path = judged(&mut nowhere::machine(&loaded), (file, &text), is_corrected)?;
+    let judge = nowhere::machine(&loaded).volumetric()?.path_judge()?;
+    let path = judge.judge((file, &text), is_corrected)?;
     let value = json!({"dry_run": true, "points": path.points.len(),
                        "largest_departure": departure_value(&path.departure)});
     output.result(&before_it_moves(file, &path), &value)
@@ -145,123 +147,54 @@ fn departure_value(departure: &Departure) -> Value {
            "place_mm": place.collect::<Vec<_>>()})
 }
 
-/// Reads and judges all of the path, point by point as it will be driven: what cannot be made to
-/// its end is not begun.
-fn judged(
-    machine: &mut Machine,
-    (file, text): (&Path, &str),
-    is_corrected: bool,
-) -> Result<CsvPath, Failure> {
-    let refused = |source| VolumetricFailure::RefusedPath {
-        path: file.to_owned(),
-        source,
-    };
-    let mover = machine.volumetric()?.uncorrected_mover()?;
-    let engine = mover.engine();
-    let path = read_path(text, engine.axes(), engine.period());
-    let path = path.map_err(|source| Failure::Usage {
-        what: format!("{}: {source}", file.display()),
-        help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm; see README.md".into(),
-    })?;
-    let checked = mover.check_path(&path.points);
-    checked.map_err(|source| refused(source.into()))?;
-    if is_corrected {
-        for (point, period) in path.points.iter().zip(0..) {
-            let place = Point::new(point[0], point[1], point[2]);
-            let at_s = f64::from(period) * engine.period().as_secs_f64();
-            let checked = machine.volumetric()?.check(place).map_err(Box::new);
-            checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
-        }
-    }
-    Ok(path)
-}
-
-fn followed(
+/// Follows the path, and says what later parts are made with, when this was the first.
+fn follow_part(
     machine: &mut Machine,
     store: &Store,
     Ready { mover, part }: Ready,
     points: Vec<Vec<Metres>>,
-) -> Result<Followed, Failure> {
+) -> Result<(PathFollowed, Option<Remembered>), Failure> {
+    let mut volume = machine.volumetric()?;
     let is_corrected = mover.is_some();
     let mut mover = match mover {
         Some(mover) => mover,
-        None => machine.volumetric()?.uncorrected_mover()?,
+        None => volume.uncorrected_mover()?,
     };
-    machine.volumetric()?.correct(&mut mover, is_corrected)?;
-    if let Some(part) = &part {
-        part.recorder.listen();
-    }
-    let mut corrected = CorrectedPath::default();
-    let count = points.len();
-    machine
-        .volumetric()?
-        .drive_along(&mut mover, points, &mut |live| corrected.note(live))?;
-    let timing = mover.engine().timing();
-    let (timing, thread) = (timing.to_string(), timing.scheduling.clone());
+    let followed = volume.follow(&mut mover, points, is_corrected, || {
+        if let Some(part) = &part {
+            part.recorder.listen();
+        }
+    })?;
     let kept = match part {
-        Some(part) => Some(machine.volumetric()?.keep_part(store, mover, part)?),
+        Some(part) => Some(volume.keep_part(store, mover, part)?),
         None => None,
     };
-    Ok(Followed {
-        count,
-        corrected: is_corrected.then_some(corrected),
-        timing,
-        thread,
-        kept,
-    })
+    Ok((followed, kept))
 }
 
-/// What the correction said along a path.
-#[derive(Default)]
-struct CorrectedPath {
-    largest: [Metres; 3],
-    u: [Metres; 3],
-    periods: u64,
-    /// The worst that it had to do without, and for how many periods.
-    without: Option<Lack>,
-    degraded: u64,
-    limited: u64,
+fn corrected_text(path: &CorrectedPath) -> String {
+    let (largest, u) = (path.largest.map(|it| it.um()), path.u.map(|it| it.um()));
+    let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
+    if path.degraded > 0 {
+        let (degraded, periods) = (path.degraded, path.periods);
+        text += &format!("\nthe correction lacked a value in {degraded} of {periods} periods");
+    }
+    if let Some(lack) = &path.without {
+        text += &format!("; without {lack}");
+    }
+    if path.limited > 0 {
+        let limited = path.limited;
+        text += &format!("\nthe correction was limited in {limited} periods");
+    }
+    text
 }
 
-impl CorrectedPath {
-    fn note(&mut self, live: &Live) {
-        self.periods += 1;
-        for axis in 0..3 {
-            self.largest[axis] = self.largest[axis].max(live.offset[axis].abs());
-            self.u[axis] = self.u[axis].max(live.uncertainty[axis]);
-        }
-        if let Validity::Without(lack) = live.validity {
-            self.without = Some(lack.worse_of(self.without));
-        }
-        self.degraded += u64::from(live.validity != Validity::Valid);
-        let is_limited = live.alarms.iter().any(Option::is_some) || live.clamped.contains(&true);
-        self.limited += u64::from(is_limited);
-    }
-
-    fn text(&self) -> String {
-        let (largest, u) = (self.largest.map(|it| it.um()), self.u.map(|it| it.um()));
-        let mut text = format!("largest corrections {largest:.3?} µm, u {u:.3?} µm at most");
-        if self.degraded > 0 {
-            let (degraded, periods) = (self.degraded, self.periods);
-            text += &format!("\nthe correction lacked a value in {degraded} of {periods} periods");
-        }
-        if let Some(lack) = &self.without {
-            text += &format!("; without {lack}");
-        }
-        if self.limited > 0 {
-            let limited = self.limited;
-            text += &format!("\nthe correction was limited in {limited} periods");
-        }
-        text
-    }
-
-    fn write_into(&self, value: &mut Value) {
-        value["largest_correction_um"] = json!(self.largest.map(|it| it.um()));
-        value["u_max_um"] = json!(self.u.map(|it| it.um()));
-        value["periods_degraded"] = json!(self.degraded);
-        value["without"] = json!(self.without.map(|it| it.to_string()));
-        value["periods_limited"] = json!(self.limited);
-    }
+fn write_corrected(path: &CorrectedPath, value: &mut Value) {
+    value["largest_correction_um"] = json!(path.largest.map(|it| it.um()));
+    value["u_max_um"] = json!(path.u.map(|it| it.um()));
+    value["periods_degraded"] = json!(path.degraded);
+    value["without"] = json!(path.without.as_ref().map(|it| it.to_string()));
+    value["periods_limited"] = json!(path.limited);
 }
 
 pub(crate) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
@@ -406,7 +339,8 @@ mod tests {
         let toml = include_str!("../../../../configs/machines/volumetric.toml");
         let loaded = config::parse(toml, "volumetric.toml").unwrap();
         let mut machine = Machine::new(&loaded, Box::new(Nobody));
-        judged(&mut machine, (Path::new("path.csv"), text), is_corrected)
+        let judge = machine.volumetric().unwrap().path_judge().unwrap();
+        judge.judge((Path::new("path.csv"), text), is_corrected)
     }
 
     /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.

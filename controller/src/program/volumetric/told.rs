@@ -1,6 +1,6 @@
 //! Runs of three axes in the words of the command line, for whoever keeps a machine.
 
-use crate::program::volumetric::{reference, verbs};
+use crate::program::volumetric::{part, reference, verbs};
 use crate::runs::Told;
 use crate::volumetric::VolumetricTeller;
 
@@ -15,6 +15,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         value: verbs::verified_value(verified),
     },
     moved: verbs::moved,
+    followed: part::followed,
     referenced: |taken| Told {
         text: reference::referenced_text(taken),
         value: reference::referenced_value(taken),

@@ -10,8 +10,9 @@ use super::super::identity::Admitted;
 use super::super::needs::{enough, of_run};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
+use crate::desk::Desk;
 use crate::order::Order;
-use crate::problem::{Problem, ProblemBody};
+use crate::problem::{Code, Problem, ProblemBody};
 use crate::request::{AnswerRequest, RunRequest};
 use crate::view::RunView;
 
@@ -41,10 +42,14 @@ pub(super) async fn plan(
 ) -> Result<impl IntoResponse, Problem> {
     enough(admitted.role, of_run(request.kind))?;
     let id = state.desk.next_run();
-    let order = Order::Plan {
-        id: id.clone(),
-        request,
+    let judging = {
+        let (desk, request) = (state.desk.clone(), request.clone());
+        // Long paths take seconds: others are served meanwhile.
+        tokio::task::spawn_blocking(move || desk.judge_path(&request))
     };
+    let path = judging.await;
+    let path = path.map_err(|it| Problem::new(Code::Busy, it.to_string(), ""))??;
+    let order = Desk::plan_order(&id, &request, path);
     obey(&state.desk, &caller, order).await?;
     let location = [(header::LOCATION, format!("/v1/runs/{id}"))];
     Ok((StatusCode::CREATED, location, Json(state.desk.run(&id)?)))

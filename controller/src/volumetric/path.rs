@@ -1,0 +1,155 @@
+//! Paths of three axes: judged whole before anything moves, on whatever thread, and followed.
+
+use core::time::Duration;
+use std::path::Path;
+
+use compensator::volumetric::{Point, Volume};
+use machine::engine::{CsvPath, Lack, Live, Validity, read_path};
+use units::Metres;
+
+use crate::failure::Failure;
+use crate::volumetric::failure::PathRefusal;
+use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::moves::check_in;
+use crate::volumetric::settings::work_volume;
+use crate::volumetric::{Mover, VolumetricFailure};
+
+/// Judges paths by what the axes can follow and by the calibrated volume.
+pub(crate) struct VolumePathJudge {
+    mover: Mover,
+    volume: Volume,
+    reach: Metres,
+}
+
+impl VolumePathJudge {
+    /// From point to point.
+    pub(super) const fn period(&self) -> Duration {
+        self.mover.engine().period()
+    }
+
+    /// Reads and judges all of the path in `text`, which is called `file`, point by point as it will be driven: what
+    /// cannot be made to its end is not begun.
+    ///
+    /// # Errors
+    /// What cannot be read, or the first point that cannot be driven.
+    pub(crate) fn judge(
+        &self,
+        (file, text): (&Path, &str),
+        is_corrected: bool,
+    ) -> Result<CsvPath, Failure> {
+        let refused = |source| VolumetricFailure::RefusedPath {
+            path: file.to_owned(),
+            source,
+        };
+        let engine = self.mover.engine();
+        let path = read_path(text, engine.axes(), engine.period());
+        let path = path.map_err(|source| Failure::Usage {
+            what: format!("{}: {source}", file.display()),
+            help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm; see README.md".into(),
+        })?;
+        let checked = self.mover.check_path(&path.points);
+        checked.map_err(|source| refused(source.into()))?;
+        if is_corrected {
+            for (point, period) in path.points.iter().zip(0..) {
+                let place = Point::new(point[0], point[1], point[2]);
+                let at_s = f64::from(period) * engine.period().as_secs_f64();
+                let checked = check_in(&self.volume, self.reach, place).map_err(Box::new);
+                checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
+            }
+        }
+        Ok(path)
+    }
+}
+
+/// A path that was followed.
+#[derive(Clone, Debug)]
+pub struct PathFollowed {
+    /// How many points it had.
+    pub count: usize,
+    /// What the correction said; `None`: by the encoders alone.
+    pub corrected: Option<CorrectedPath>,
+    /// How punctual the loop was.
+    pub timing: String,
+    /// How the loop's thread was scheduled.
+    pub thread: String,
+    /// Its last period.
+    pub(super) last: Option<Live>,
+}
+
+/// What the correction said along a path.
+#[derive(Clone, Debug, Default)]
+pub struct CorrectedPath {
+    /// The largest, by axis.
+    pub largest: [Metres; 3],
+    /// Its largest standard uncertainty.
+    pub u: [Metres; 3],
+    /// So many periods.
+    pub periods: u64,
+    /// The worst that it had to do without.
+    pub without: Option<Lack>,
+    /// For so many periods.
+    pub degraded: u64,
+    /// In so many it was limited.
+    pub limited: u64,
+}
+
+impl CorrectedPath {
+    fn note(&mut self, live: &Live) {
+        self.periods += 1;
+        for axis in 0..3 {
+            self.largest[axis] = self.largest[axis].max(live.offset[axis].abs());
+            self.u[axis] = self.u[axis].max(live.uncertainty[axis]);
+        }
+        if let Validity::Without(lack) = live.validity {
+            self.without = Some(lack.worse_of(self.without));
+        }
+        self.degraded += u64::from(live.validity != Validity::Valid);
+        let is_limited = live.alarms.iter().any(Option::is_some) || live.clamped.contains(&true);
+        self.limited += u64::from(is_limited);
+    }
+}
+
+impl WorkVolume<'_> {
+    /// Who judges paths of the three axes.
+    ///
+    /// # Errors
+    /// When an axis is not made for it.
+    pub(crate) fn path_judge(&self) -> Result<VolumePathJudge, Failure> {
+        let config = self.config;
+        Ok(VolumePathJudge {
+            mover: self.uncorrected_mover()?,
+            volume: work_volume(config).map_err(VolumetricFailure::from)?,
+            reach: Metres::from_um(config.compensation.size_limit_um),
+        })
+    }
+
+    /// Follows `points`, corrected or not; `begun` is called when the correction is there and the path begins.
+    ///
+    /// # Errors
+    /// Those of [`Self::correct`] and [`Self::drive_along`].
+    pub(crate) fn follow(
+        &mut self,
+        mover: &mut Mover,
+        points: Vec<Vec<Metres>>,
+        is_corrected: bool,
+        begun: impl FnOnce(),
+    ) -> Result<PathFollowed, Failure> {
+        self.correct(mover, is_corrected)?;
+        begun();
+        let mut corrected = CorrectedPath::default();
+        let mut last = None;
+        let count = points.len();
+        self.drive_along(mover, points, &mut |live| {
+            corrected.note(live);
+            last = Some(*live);
+        })?;
+        let timing = mover.engine().timing();
+        Ok(PathFollowed {
+            count,
+            corrected: is_corrected.then_some(corrected),
+            timing: timing.to_string(),
+            thread: timing.scheduling.clone(),
+            last,
+        })
+    }
+}
