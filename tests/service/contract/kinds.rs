@@ -4,11 +4,12 @@ use std::path::Path;
 
 use mock_bus::plant::{LineOptics, LineSetUp};
 use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
-use tests::{Edit, UVW, VOLUMETRIC};
+use tests::volume::quick;
+use tests::{Edit, Rig, UVW, VOLUMETRIC};
 use units::Metres;
 
-use super::{Bed, SEED, anna, bert, each, to};
-use crate::client::PATIENCE;
+use super::{Bed, SEED, anna, bert, compensated, each, to};
+use crate::client::{InProcess, PATIENCE};
 use crate::stage::Stage;
 
 const SCREWS: [&str; 3] = ["u", "v", "w"];
@@ -193,4 +194,54 @@ fn a_stop_while_three_axes_move_together_is_taken_at_once_and_needs_no_reset() {
             bed.client.zero(&anna(), None);
         });
     }
+}
+
+/// As three axes say where a line is: the axis that straightness and angular optics see, as a direction.
+fn line_of(task: &serde_json::Value) -> LineSetUp {
+    let point = |name: &str| [0, 1, 2].map(|k| task[name][k].as_f64().expect("a place"));
+    let (start, end, tool) = (point("start_mm"), point("end_mm"), point("tool_mm"));
+    let side = ["x", "y", "z"].map(|it| f64::from(u8::from(task["side"] == it)));
+    LineSetUp {
+        optics: match task["optics"].as_str() {
+            Some("straightness") => LineOptics::Straightness { across: side },
+            Some("angular") => LineOptics::Angular { about: side },
+            _ => LineOptics::Linear,
+        },
+        along: [0, 1, 2].map(|k| end[k] - start[k]),
+        tool_offset: tool.map(Metres::from_mm),
+    }
+}
+
+/// Once, and by the library alone.
+#[test]
+fn three_axes_are_calibrated_with_whoever_sets_up_their_lines_and_corrected_from_then_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let stage = Stage::new(Rig::InProcess, (VOLUMETRIC, SEED), folder.path(), quick);
+    let client = InProcess::of(&stage);
+    let bed = Bed {
+        stage: &stage,
+        client: &client,
+    };
+    bed.client.zero(&anna(), None);
+    let id = bed.run_of(RunKind::Calibrate);
+    let mut lines = 0;
+    let made = loop {
+        let run = bed.asks_or_ends(&id);
+        let Some(question) = run.question else {
+            break run;
+        };
+        let line = line_of(&question.task);
+        bed.stage
+            .simulation(move |machine| machine.set_up_line(&line));
+        lines += 1;
+        bed.answer(&id, question.number, "done").unwrap();
+    };
+    assert_eq!(made.state, RunState::Done, "{made:?}");
+    assert_eq!(made.plan.asks.len(), lines);
+    assert!(made.result["geometry"].is_string(), "{made:?}");
+    let moved = bed.begin(&compensated("x", 100.0));
+    let view = bed.ended(&moved);
+    assert_eq!(view.state, MotionState::Done, "{view:?}");
+    assert_eq!(view.axes["x"].corrected, "yes");
+    stage.end();
 }

@@ -8,7 +8,7 @@ use service::{
     AxisState, Code, Coordinate, Event, IfMoving, MachineState, MotionState, MotionView,
     MoveRequest, RunKind, RunRequest, RunState, StopMode,
 };
-use tests::volume::{Volume, good};
+use tests::volume::{Volume, good, quick};
 use tests::{Edit, UVW, VOLUMETRIC};
 use units::{Metres, Radians};
 
@@ -252,19 +252,13 @@ fn a_platform_that_is_stopped_under_way_stands_and_says_who_did_it() {
 
 /// Three axes whose errors are known, and what their detectors read.
 fn with_known_volume(body: impl Fn(&Bed<'_>)) {
-    let few = |text: String| {
-        text.edit(
-            "step_mm = 50.0\nsettle_ms = 100.0",
-            "step_mm = 250.0\nsettle_ms = 50.0",
-        )
-    };
-    let mut before = Volume::zeroed(SEED, few, |text| text);
+    let mut before = Volume::zeroed(SEED, quick, |text| text);
     before.know_errors();
     let store = before.bench.store.clone();
     good(before.work().reference(&store));
     let new = |rig, folder: &Path| {
         before.bequeath(&folder.join("volumetric"));
-        Stage::new(rig, (VOLUMETRIC, SEED), folder, few)
+        Stage::new(rig, (VOLUMETRIC, SEED), folder, quick)
     };
     each_here(new, |bed| {
         bed.client.zero(&anna(), None);
