@@ -1,6 +1,6 @@
-"""GTC's answer to an uncertainty budget, from standard input to one line of JSON.
+"""GTC's answers to uncertainty budgets, from standard input to one line of JSON.
 
-In: contributions, calibrated positions, places and pairs of places. Out: for each place its combined
+In: of each its contributions, calibrated positions, places and pairs of places. Out: for each place its combined
 standard uncertainty and its degrees of freedom (null for infinitely many), for each pair its covariance.
 GTC is the uncertainty calculator of the Measurement Standards Laboratory of New Zealand.
 """
@@ -60,8 +60,7 @@ class Axis:
         return total
 
 
-def main():
-    task = json.load(sys.stdin)
+def answer(task):
     axis = Axis(task)
     places = []
     for x, side in task["places"]:
@@ -72,7 +71,7 @@ def main():
         get_covariance(axis.value(*one, False), axis.value(*other, False))
         for one, other in task["pairs"]
     ]
-    print(json.dumps({"places": places, "pairs": pairs}), flush=True)
+    return {"places": places, "pairs": pairs}
 
 
-main()
+print(json.dumps([answer(task) for task in json.load(sys.stdin)]), flush=True)

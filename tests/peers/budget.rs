@@ -105,38 +105,49 @@ fn assert_close(what: &str, ours: f64, theirs: &Value, scale: f64) {
     );
 }
 
+/// All budgets at once: GTC takes a second to begin.
 #[test]
 fn gtc_comes_to_the_same_uncertainties_degrees_of_freedom_and_covariances() {
-    for seed in 1..=BUDGETS {
-        let state = &mut (seed ^ 0x6774_6300);
-        let budget = drawn(state);
-        let places: Vec<_> = (0..20).map(|_| place(&budget, state)).collect();
-        let mut peer = Peer::start("budget.py", &[]);
-        peer.feed(&task(&budget, &places).to_string());
-        let report = peer.finish();
-        let u = |it: &(Metres, Approach)| {
-            let combined = budget.at(it.0, it.1).expect("it is within");
-            (
-                combined.standard_uncertainty.value(),
-                combined.degrees_of_freedom,
-            )
-        };
-        for (at, it) in places.iter().enumerate() {
-            let (ours, freedom) = u(it);
-            let theirs = &report["places"][at];
-            assert_close("u", ours, &theirs[0], ours);
-            match freedom {
-                Some(ours) => assert_close("degrees of freedom", ours, &theirs[1], ours),
-                None => assert_eq!(theirs[1], Value::Null),
-            }
+    let budgets: Vec<_> = (1..=BUDGETS)
+        .map(|seed| {
+            let state = &mut (seed ^ 0x6774_6300);
+            let budget = drawn(state);
+            let places: Vec<_> = (0..20).map(|_| place(&budget, state)).collect();
+            (budget, places)
+        })
+        .collect();
+    let tasks: Vec<_> = budgets.iter().map(|it| task(&it.0, &it.1)).collect();
+    let mut peer = Peer::start("budget.py", &[]);
+    peer.feed(&Value::from(tasks).to_string());
+    let reports = peer.finish();
+    for (at, (budget, places)) in budgets.iter().enumerate() {
+        check(budget, places, &reports[at]);
+    }
+}
+
+fn check(budget: &AxisBudget, places: &[(Metres, Approach)], report: &Value) {
+    let u = |it: &(Metres, Approach)| {
+        let combined = budget.at(it.0, it.1).expect("it is within");
+        (
+            combined.standard_uncertainty.value(),
+            combined.degrees_of_freedom,
+        )
+    };
+    for (at, it) in places.iter().enumerate() {
+        let (ours, freedom) = u(it);
+        let theirs = &report["places"][at];
+        assert_close("u", ours, &theirs[0], ours);
+        match freedom {
+            Some(ours) => assert_close("degrees of freedom", ours, &theirs[1], ours),
+            None => assert_eq!(theirs[1], Value::Null),
         }
-        for (at, pair) in places.windows(2).enumerate() {
-            let ours = budget
-                .covariance(pair[0], pair[1])
-                .expect("both are within");
-            // Of nothing in common both make a zero but for rounding.
-            let scale = u(&pair[0]).0 * u(&pair[1]).0;
-            assert_close("covariance", ours, &report["pairs"][at], scale);
-        }
+    }
+    for (at, pair) in places.windows(2).enumerate() {
+        let ours = budget
+            .covariance(pair[0], pair[1])
+            .expect("both are within");
+        // Of nothing in common both make a zero but for rounding.
+        let scale = u(&pair[0]).0 * u(&pair[1]).0;
+        assert_close("covariance", ours, &report["pairs"][at], scale);
     }
 }
