@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use units::Approach;
 
 use crate::store::EnvironmentRecord;
+use crate::store::budget::PlacesBudgetRecord;
 
 /// One measured point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +41,7 @@ impl PointEntry {
 }
 
 /// What a zero search found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZeroEntry {
     /// The origin in the drive's coordinates before it became zero, metres.
@@ -55,6 +56,9 @@ pub struct ZeroEntry {
     pub mid_v: f64,
     /// Monotonic time of the machine, seconds.
     pub at_s: f64,
+    /// What makes it uncertain; `None` in journals of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<PlacesBudgetRecord>,
 }
 
 /// How far the stage of a gantry was turned.

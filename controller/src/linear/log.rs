@@ -126,7 +126,9 @@ fn zero(it: &ZeroEntry) -> Judged {
     number("patent_p0_m", it.patent_p0_m, &PLACE_M)?;
     number("peak_max_v", it.peak_max_v, &VOLTS)?;
     number("mid_v", it.mid_v, &VOLTS)?;
-    number("at_s", it.at_s, &SECONDS)
+    number("at_s", it.at_s, &SECONDS)?;
+    let budget = it.budget.as_ref();
+    budget.map_or(Ok(()), |it| it.judge(&[(0, u)]))
 }
 
 fn rotation(it: &RotationEntry) -> Judged {

@@ -8,6 +8,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use compensator::budget::PlacesBudget;
 use compensator::hall_zero::{
     FlatLevel, Outcome, Pass, Progress, Sample, Search, Settings, ZeroEstimate, flat_level,
     single_threshold_zero,
@@ -25,6 +26,7 @@ use crate::linear::ZeroConfig;
 use crate::linear::ZeroEntry;
 use crate::linear::passes::{SEARCHED, STEPS};
 use crate::linear::stage::{LinearStage, gantry_of};
+use crate::linear::zero_budget;
 use crate::linear::{LinearEntry, LinearLog};
 use crate::run::utc_now;
 use crate::run::{missing, note_failure};
@@ -142,9 +144,9 @@ impl LinearStage<'_> {
             .observer()
             .progress(Stage::Zero, self.axis, SEARCHED, STEPS);
         let passes = self.passes(config, &settings, &outcome)?;
-        let estimate = self.estimate(config, &settings, &outcome, &passes)?;
-        let entry = self.zero_entry(&estimate);
-        journal.write(&LinearEntry::Zero(entry))?;
+        let (estimate, budget) = self.estimate(config, &settings, &outcome, &passes)?;
+        let entry = self.zero_entry(&estimate, &budget);
+        journal.write(&LinearEntry::Zero(entry.clone()))?;
         self.adopt_zero(config, estimate.origin)?;
         self.core
             .observer()
@@ -241,7 +243,7 @@ impl LinearStage<'_> {
         settings: &Settings,
         outcome: &Outcome,
         passes: &[Pass],
-    ) -> Result<ZeroEstimate, Failure> {
+    ) -> Result<(ZeroEstimate, PlacesBudget<Metres>), Failure> {
         let refined = outcome.refine_by_passes(passes, settings);
         let mut estimate = refined.map_err(|source| Failure::Refine {
             axis: self.axis.to_owned(),
@@ -249,6 +251,10 @@ impl LinearStage<'_> {
         })?;
         // The drive takes its zero in whole counts.
         let count = self.config.motion.resolution_nm.abs() * 1e-9;
+        let budget = zero_budget::budget(&estimate, count).map_err(|source| Failure::Budget {
+            axis: self.axis.to_owned(),
+            source,
+        })?;
         let of_passes = estimate.standard_uncertainty.value();
         estimate.standard_uncertainty = Metres(combine(&[of_passes, of_rounding(count)]));
         let limit = Metres::from_um(config.standard_uncertainty_limit_um);
@@ -261,7 +267,7 @@ impl LinearStage<'_> {
                 scatter: estimate.passes.map_or(seen, |it| it.scatter),
             });
         }
-        Ok(estimate)
+        Ok((estimate, budget))
     }
 
     /// Goes to the origin and makes it the drive's zero.
@@ -296,7 +302,7 @@ impl LinearStage<'_> {
         Ok(())
     }
 
-    fn zero_entry(&self, estimate: &ZeroEstimate) -> ZeroEntry {
+    fn zero_entry(&self, estimate: &ZeroEstimate, budget: &PlacesBudget<Metres>) -> ZeroEntry {
         ZeroEntry {
             origin_m: estimate.origin.value(),
             standard_uncertainty_m: estimate.standard_uncertainty.value(),
@@ -304,6 +310,7 @@ impl LinearStage<'_> {
             peak_max_v: estimate.peak_max.value(),
             mid_v: estimate.mid_voltage.value(),
             at_s: self.core.now().seconds(),
+            budget: Some(zero_budget::record(budget, estimate.origin)),
         }
     }
 

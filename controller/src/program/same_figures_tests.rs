@@ -5,7 +5,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::emulated::Emulated;
-use crate::linear::{Calibrated, Verified};
+use crate::linear::{Calibrated, Verified, Zeroed};
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::PlatformVerified;
 use crate::program::kind::KINDS;
@@ -194,11 +194,11 @@ fn a_linear_axis_is_told_by_the_same_figures_everywhere() {
         include_str!("../../../configs/emulated/linear.toml"),
     ]);
     let store = desk.store.clone();
-    let (calibrated, verified) = desk
+    let (zeroed, calibrated, verified) = desk
         .machine
         .guarded(|machine| {
             machine.start()?;
-            machine.linear("x")?.zero(&store)?;
+            let zeroed = machine.linear("x")?.zero(&store)?;
             let calibrated = machine
                 .linear("x")?
                 .calibrate(&store, &Default::default())?;
@@ -208,11 +208,23 @@ fn a_linear_axis_is_told_by_the_same_figures_everywhere() {
                 resume: None,
             };
             let verified = machine.linear("x")?.verify(&store, &options)?;
-            Ok((calibrated, verified))
+            Ok((zeroed, calibrated, verified))
         })
         .unwrap();
+    check_zero(&zeroed);
     check_linear_calibration(&desk, &calibrated);
     check_linear_verification(&verified);
+}
+
+#[track_caller]
+fn check_zero(zeroed: &Zeroed) {
+    let told = linear::zeroed("x", zeroed);
+    let page = words(&report::html(&zeroed.journal).unwrap());
+    let u = zeroed.entry.standard_uncertainty_m;
+    let expanded = at(&told.value, "/uncertainty/largest/expanded_um");
+    stored(expanded, 2.0 * u, UM);
+    everywhere(expanded, &[(&told.text, "uncertainty U (k = 2) up to ")]);
+    check("combined u", u * 1e9, behind(&page, "combined u ", 1)[0]);
 }
 
 #[track_caller]

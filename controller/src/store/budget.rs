@@ -280,3 +280,69 @@ impl From<CorrelationRecord> for Correlation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use units::Metres;
+
+    use super::*;
+
+    /// 30 nm and 40 nm at one place, 30 nm alone at the other.
+    fn record() -> PlacesBudgetRecord {
+        let line = |value: f64, degrees_of_freedom| Contribution {
+            name: "input".to_owned(),
+            evaluation: Evaluation::A,
+            value,
+            unit: "m".to_owned(),
+            sensitivity: 1.0,
+            degrees_of_freedom,
+            correlation: Correlation::SharedReadings,
+            approach: None,
+        };
+        let lines = vec![line(30e-9, Some(8.0)), line(20e-9, None)];
+        let budget = PlacesBudget::<Metres>::new(lines, vec![vec![1.0, 2.0], vec![1.0, 0.0]]);
+        let places = vec![(vec![0.0], Some(Approach::Forward)), (vec![0.1], None)];
+        PlacesBudgetRecord::new(&budget.unwrap(), places)
+    }
+
+    #[test]
+    fn a_budget_is_judged_by_its_lines_and_by_what_is_stated_elsewhere() {
+        let stated = [(0, 50e-9), (1, 30e-9)];
+        record().judge(&stated).unwrap();
+        assert_eq!(record().least_certain(), Some(&record().places[0]));
+        let check = |changed: fn(&mut PlacesBudgetRecord), place: &str| {
+            let mut record = record();
+            changed(&mut record);
+            assert_eq!(record.judge(&stated).unwrap_err().place, place);
+        };
+        check(|it| it.places[1].u_si *= 1.001, "budget.places[1].u_si");
+        check(
+            |it| it.places[0].expanded_u_si = 50e-9,
+            "budget.places[0].expanded_u_si",
+        );
+        let freedom = "budget.places[0].degrees_of_freedom";
+        check(|it| it.places[0].degrees_of_freedom = None, freedom);
+        let few = "budget.places[1].sensitivities";
+        check(|it| it.places[1].sensitivities.truncate(1), few);
+        check(|it| it.coverage_factor = 3.0, "budget.coverage_factor");
+        check(
+            |it| it.contributions[0].value = 31e-9,
+            "budget.places[0].u_si",
+        );
+        check(|it| it.places.clear(), "budget.places");
+        let wrong = record().judge(&[(1, 31e-9)]).unwrap_err();
+        assert_eq!(wrong.place, "budget.places[1].u_si");
+    }
+
+    #[test]
+    fn a_budget_comes_back_as_it_was_kept() {
+        let text = serde_json::to_string(&record()).unwrap();
+        assert_eq!(
+            serde_json::from_str::<PlacesBudgetRecord>(&text).unwrap(),
+            record()
+        );
+        assert!(
+            text.contains("\"shared_readings\"") && text.contains("\"degrees_of_freedom\":null")
+        );
+    }
+}

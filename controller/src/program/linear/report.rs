@@ -144,7 +144,7 @@ fn zeros(zeros: &[ZeroEntry]) -> String {
             zero.mid_v
         );
     }
-    html + "</table>"
+    html + "</table>" + &uncertainty::of_last(zeros)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use units::Short;
 
-use crate::linear::{Calibrated, LinearTeller, Moved, Verified, Zeroed};
+use crate::linear::{Calibrated, LinearTeller, Moved, Verified, ZeroEntry, Zeroed};
 use crate::program::linear::{moved as of_move, uncertainty};
 use crate::program::{json as to_json, text};
 use crate::runs::Told;
@@ -33,7 +33,7 @@ pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
         zeroed.journal.display()
     );
     let drift = zeroed.previous.as_ref().map(|before| {
-        let now = zeroed.entry;
+        let now = &zeroed.entry;
         (
             (now.peak_max_v - before.peak_max_v) * 1e3,
             (now.mid_v - before.mid_v) * 1e3,
@@ -54,14 +54,20 @@ pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
     let value = json!({
         "axis": axis,
         "zero": to_json::zero(estimate),
+        "uncertainty": uncertainty::value_of_zero(&zeroed.entry),
         "flat_level": zeroed.flat.map(|it| json!({"steepness": it.steepness, "linearity": it.linearity})),
         "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
         "journal": zeroed.journal,
     });
     Told {
-        text: text + &since + &flat,
+        text: text + &since + &budget_of_zero(&zeroed.entry) + &flat,
         value,
     }
+}
+
+fn budget_of_zero(entry: &ZeroEntry) -> String {
+    let worst = uncertainty::of_zero(entry);
+    worst.map_or_else(String::new, |it| format!("\n{}", it.sentence()))
 }
 
 pub(crate) fn calibrated(calibrated: &Calibrated) -> Told {

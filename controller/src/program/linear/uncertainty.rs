@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 use units::{Approach, Metres, Short};
 
 use crate::linear::record::{BudgetRecord, CombinedRecord};
-use crate::linear::{LinearContent, UncertaintyAtTarget};
-use crate::program::budget::{AtWorst, LENGTHS};
+use crate::linear::{LinearContent, UncertaintyAtTarget, ZeroEntry};
+use crate::program::budget::{AtWorst, LENGTHS, value_of};
+use crate::program::json::um;
+use crate::store::budget::PlaceBudgetRecord;
 
 /// Of a calibration that has no budget.
 pub(crate) const NOT_STATED: &str = "u: scatter and instrument alone; the calibration has no uncertainty budget \
@@ -57,6 +59,17 @@ pub(crate) fn worst(content: &LinearContent) -> Option<AtWorst> {
         told: LENGTHS,
     };
     Some(worst.sorted())
+}
+
+/// The budget of a zero.
+pub(crate) fn of_zero(entry: &ZeroEntry) -> Option<AtWorst> {
+    AtWorst::of(entry.budget.as_ref()?, LENGTHS, |_| "the zero".to_owned())
+}
+
+/// The same for programs.
+pub(crate) fn value_of_zero(entry: &ZeroEntry) -> Value {
+    let largest = |it: &PlaceBudgetRecord| json!({"expanded_um": um(Metres(it.expanded_u_si))});
+    value_of(entry.budget.as_ref(), largest)
 }
 
 /// In one line: the largest uncertainty, and what makes it.

@@ -4,8 +4,8 @@ use core::fmt::Write as _;
 
 use units::Metres;
 
-use crate::linear::LinearContent;
 use crate::linear::record::{BudgetRecord, CombinedRecord, PlaceRecord};
+use crate::linear::{LinearContent, ZeroEntry};
 use crate::program::linear::uncertainty;
 use crate::program::page::escape;
 use crate::program::page::svg::{Axes, FORWARD, HEIGHT, REVERSE, WIDTH, grid, padded};
@@ -23,6 +23,12 @@ pub(super) fn html(content: &LinearContent) -> String {
         html += &format!("<figure>{}</figure>", curve(budget));
     }
     html + &uncertainty::worst(content).map_or_else(String::new, |it| it.table())
+}
+
+/// The budget of the last zero.
+pub(super) fn of_last(zeros: &[ZeroEntry]) -> String {
+    let last = zeros.last().and_then(uncertainty::of_zero);
+    last.map_or_else(String::new, |it| it.table())
 }
 
 fn expanded(budget: &BudgetRecord) -> impl Iterator<Item = f64> {
