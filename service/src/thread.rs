@@ -312,11 +312,9 @@ impl Kept {
     fn choose(&mut self, choice: &Choice, by: &str) -> Result<Answer, Problem> {
         let (axis, named) = self.chosen_by(choice).map_err(Problem::from)?;
         self.keeper.borrow().require_own_calibration(&axis)?;
+        let group = self.keeper.borrow().own_group(&axis)?;
         let machine = &mut self.machine;
-        let used = machine.linear(&axis).and_then(|mut stage| match named {
-            Some(id) => stage.activate(&self.store, &id).map(|()| id),
-            None => stage.rollback(&self.store),
-        });
+        let used = group.choose(machine, &self.store, named.as_deref());
         let id = used.map_err(Problem::from)?;
         let mechanics = Mechanics::of(machine, &axis).map_err(Problem::from)?;
         let mut keeper = self.keeper.borrow_mut();

@@ -23,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    choose: None,
     paths: None,
     moves: Some(&MOVES),
 };

@@ -27,6 +27,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
+    choose: Some(choose),
     paths: None,
     moves: None,
 };
@@ -216,4 +217,17 @@ fn load(
         Some(_) => table.load_active(store)?,
     };
     Ok(vec![(axis.to_owned(), id)])
+}
+
+fn choose(
+    machine: &mut Machine,
+    store: &Store,
+    axis: &str,
+    id: Option<&str>,
+) -> Result<String, Failure> {
+    let mut own = machine.rotary(axis)?;
+    match id {
+        Some(id) => own.activate(store, id).map(|()| id.to_owned()),
+        None => own.rollback(store),
+    }
 }

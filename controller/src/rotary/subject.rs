@@ -109,17 +109,20 @@ impl Subject<'_> {
 
     /// The calibration that `store` says is active, after checking that it belongs to this machine.
     pub(super) fn in_use(&self, store: &Store) -> Result<Option<TableInUse>, Failure> {
-        let Some(id) = store.active(self.axis)?.current else {
-            return Ok(None);
-        };
-        let record = store.load::<RotaryContent>(&id)?;
+        let id = store.active(self.axis)?.current;
+        id.map(|id| self.usable(store, &id)).transpose()
+    }
+
+    /// The calibration `id`, after the same check.
+    pub(super) fn usable(&self, store: &Store, id: &str) -> Result<TableInUse, Failure> {
+        let record = store.load::<RotaryContent>(id)?;
         let here = RecordHead {
             drive: self.drive_beside(&record.head.drive),
             ..self.here.clone()
         };
-        record.head.belongs_to(&id, &here, self.hash)?;
-        let compensation = self.prepare(&record.content, &id)?;
-        Ok(Some(TableInUse::new(&id, &record, compensation)?))
+        record.head.belongs_to(id, &here, self.hash)?;
+        let compensation = self.prepare(&record.content, id)?;
+        Ok(TableInUse::new(id, &record, compensation)?)
     }
 }
 

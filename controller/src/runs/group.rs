@@ -58,11 +58,16 @@ pub(crate) struct GroupRuns {
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
     pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
+    /// Uses this calibration of an axis from now on, or the one before; its name. Where each axis has its own.
+    pub(crate) choose: Option<Chooses>,
     /// Who judges paths that it follows, where it follows some.
     pub(crate) paths: Option<MakesPathJudge>,
     /// How it is moved as one, where it is.
     pub(crate) moves: Option<&'static GroupMoves>,
 }
+
+/// Uses another calibration of an axis.
+pub(crate) type Chooses = fn(&mut Machine, &Store, &str, Option<&str>) -> Result<String, Failure>;
 
 /// Makes who judges paths.
 pub(crate) type MakesPathJudge = fn(&mut Machine) -> Result<PathJudge, Failure>;
@@ -152,6 +157,24 @@ impl Group {
         store: &Store,
     ) -> Result<Vec<(String, Option<String>)>, Failure> {
         (self.runs.load)(machine, store, &self.name)
+    }
+
+    /// Uses the calibration `id` of its only axis from now on, or without one the one that was used before; says which
+    /// that is. Nothing moves.
+    ///
+    /// # Errors
+    /// When its axes are calibrated together, or it cannot be used; the one before is used still.
+    pub fn choose(
+        &self,
+        machine: &mut Machine,
+        store: &Store,
+        id: Option<&str>,
+    ) -> Result<String, Failure> {
+        let choose = self.runs.choose.ok_or_else(|| Failure::Usage {
+            what: format!("the axes of {} are calibrated together", self.name),
+            help: "use `truestage cal` while the service is not running".into(),
+        })?;
+        choose(machine, store, &self.name, id)
     }
 
     /// Who judges paths that it follows; `None` where it follows none.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use machine::Stage;
+use machine::records::Store;
 use serde_json::json;
 
 use crate::config::MachineConfig;
@@ -33,7 +34,8 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse,
     planned,
     perform,
-    load: |_, _, _| Ok(Vec::new()),
+    load,
+    choose: None,
     paths: Some(paths),
     moves: Some(&MOVES),
 };
@@ -91,6 +93,19 @@ impl WorkVolume<'_> {
             ..Planned::default()
         })
     }
+}
+
+/// Whether what is stored can be used, and which errors that corrects.
+fn load(
+    machine: &mut Machine,
+    store: &Store,
+    _: &str,
+) -> Result<Vec<(String, Option<String>)>, Failure> {
+    let volume = machine.volumetric()?;
+    let stored = volume.state(store)?;
+    let geometry = stored.map(|(_, records)| records.geometry);
+    let axes = volume.config().axes.iter();
+    Ok(axes.map(|it| (it.clone(), geometry.clone())).collect())
 }
 
 fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {

@@ -177,7 +177,7 @@ impl Keeper {
     pub(crate) fn require_own_calibration(&self, axis: &str) -> Result<(), Problem> {
         let at = self.place(axis)?;
         let seat = &self.seats[at];
-        if seat.moved == Moved::Alone && seat.linear().is_some() {
+        if seat.moved == Moved::Alone {
             return self.require_free(at);
         }
         let what = format!("the calibration of axis {axis} is not chosen while the service runs");

@@ -238,7 +238,9 @@ fn three_axes_are_calibrated_with_whoever_sets_up_their_lines_and_corrected_from
     };
     assert_eq!(made.state, RunState::Done, "{made:?}");
     assert_eq!(made.plan.asks.len(), lines);
-    assert!(made.result["geometry"].is_string(), "{made:?}");
+    let geometry = made.result["geometry"].as_str().expect("it is stored");
+    let axis = bed.client.axis("z").unwrap();
+    assert_eq!(axis.calibration.as_deref(), Some(geometry));
     let moved = bed.begin(&compensated("x", 100.0));
     let view = bed.ended(&moved);
     assert_eq!(view.state, MotionState::Done, "{view:?}");

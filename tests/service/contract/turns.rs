@@ -103,6 +103,15 @@ fn a_calibrated_table_is_corrected_and_says_how_uncertain_that_is() {
         let Coordinate::Angle(_) = request.targets["c"] else {
             panic!("an angle");
         };
+        let made = bed
+            .client
+            .axis("c")
+            .unwrap()
+            .calibration
+            .expect("it is in use");
+        let none = bed.client.rollback(&anna(), "c").unwrap_err();
+        assert_eq!(none.code, Code::NoSuchCalibration, "{none}");
+        bed.client.activate(&anna(), &made[..12]).unwrap();
         let view = bed.ended(&bed.begin(&request));
         let leg = &view.axes["c"];
         assert_eq!(
