@@ -59,6 +59,7 @@ mod hardware;
 mod homing;
 mod kinds;
 pub mod linear;
+mod made_by;
 mod memories;
 mod pairing;
 pub mod platform;

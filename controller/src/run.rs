@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
+use crate::made_by::made_by;
 use crate::store::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, Log, RecordHead, SCHEMA_VERSION,
 };
@@ -59,7 +60,7 @@ pub(crate) fn this_machine(
         resolution_m: linear.map(|axis| axis.motion.resolution_nm * 1e-9),
         resolution_rad: rotary.map(|it| TAU / f64::from(it.counts_per_turn)),
         created: String::new(),
-        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+        program: made_by(),
         source: String::new(),
         instrument: InstrumentRecord::default(),
         environment: EnvironmentRecord::default(),

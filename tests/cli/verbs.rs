@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::programs::{Bench, check_error, live_rigs, truestage};
+use crate::programs::{Bench, check_error, check_says, live_rigs, truestage};
 use tests::Edit;
 
 fn number(value: &Value) -> f64 {
@@ -72,23 +72,19 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
             "machine.toml",
             id,
             text(&aside["calibration"]),
+            "--page",
+            "diff.html",
         ];
         bench.run_plainly(&words).with_code(0);
+        let page = fs::read_to_string(bench.folder().join("diff.html")).unwrap();
+        check_says(&page, &["Error tables: change", "<svg", "Δ forward"]);
 
         let verified = bench.run(&["verify"]).with_code(0);
         let accuracy = number(&verified["as_left"]["accuracy"]["bidirectional"]);
         assert!((0.0..=2.0).contains(&accuracy), "A = {accuracy} µm");
         evaluated_again(&bench, &calibrated, &verified);
 
-        let report = bench.run(&[
-            "report",
-            text(&verified["journal"]),
-            "--output",
-            "page.html",
-        ]);
-        report.with_code(0);
-        let page = fs::read_to_string(bench.folder().join("page.html")).unwrap();
-        assert!(page.contains("<svg"), "a report has pictures");
+        reported(&bench, &calibrated, &verified);
 
         let moved = ["move", "machine.toml", "x=12.5mm", "--record", "move.log"];
         let moved = bench.run(&moved).with_code(0);
@@ -105,6 +101,27 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         out_of_tolerance(&bench);
         assert_eq!(bench.stop(), Some(0));
     }
+}
+
+/// The verification on a page, its pictures by themselves, and beside the calibration.
+fn reported(bench: &Bench, calibrated: &Value, verified: &Value) {
+    let journal = text(&verified["journal"]);
+    let words = ["report", journal, "--output", "page.html", "--svg", "drawn"];
+    let report = bench.run(&words).with_code(0);
+    let page = fs::read_to_string(bench.folder().join("page.html")).unwrap();
+    let pictures = report["pictures"].as_array().expect("a list");
+    assert!(!pictures.is_empty() && page.matches("<svg").count() == pictures.len());
+    for it in pictures {
+        let svg = fs::read_to_string(bench.folder().join(text(it))).unwrap();
+        assert!(svg.starts_with("<svg xmlns"), "{svg}");
+    }
+    let words = ["report", "--compare", text(&calibrated["journal"]), journal];
+    let compared = bench.run(&words).with_code(0);
+    let accuracy = &compared["figures"][0];
+    assert_eq!(
+        accuracy["second"],
+        verified["as_left"]["accuracy"]["bidirectional"]
+    );
 }
 
 /// The journals of runs, by the verbs for data measured elsewhere.

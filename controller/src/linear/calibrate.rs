@@ -14,6 +14,7 @@ use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
 use crate::linear::run_plan::{RunPlan, of_calibration};
 use crate::linear::settings;
 use crate::linear::stage::{LinearStage, Usable};
+use crate::made_by::made_by;
 use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
 use crate::store::{CalibrationRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store};
 use machine::Stage;
@@ -216,6 +217,7 @@ impl LinearStage<'_> {
             drive: self.core.drive_record(self.axis),
             instrument: self.core.instrument_record(&plan.instrument),
             started: utc_now(),
+            program: Some(made_by()),
             calibration,
             targets_m: plan.targets.iter().map(|target| target.value()).collect(),
             runs: plan.runs,

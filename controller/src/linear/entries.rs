@@ -1,8 +1,11 @@
 //! What a journal says of a linear axis.
 
+use compensator::hall_zero::{Held, Outcome};
+use machine::BusFigures;
 use serde::{Deserialize, Serialize};
 use units::Approach;
 
+use crate::linear::record::PlaceRecord;
 use crate::store::EnvironmentRecord;
 use crate::store::budget::PlacesBudgetRecord;
 
@@ -59,6 +62,120 @@ pub struct ZeroEntry {
     /// What makes it uncertain; `None` in journals of earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<PlacesBudgetRecord>,
+}
+
+/// By what a verification is judged, and how uncertain the corrected position is; written before its first point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CriterionEntry {
+    /// What the bidirectional accuracy may be, metres.
+    pub tolerance_m: f64,
+    /// How uncertain the corrected position is at each target; empty for a measurement as found.
+    pub targets: Vec<PlaceRecord>,
+}
+
+/// Both sensors at one of the places where a zero search stood still: means of its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldEntry {
+    /// Where, in the drive's coordinates before the origin became zero, metres.
+    pub position_m: f64,
+    /// Of the even sensor, volts.
+    pub peak_v: f64,
+    /// Of the odd one, volts.
+    pub slope_v: f64,
+}
+
+/// What a zero search read of both Hall sensors on its way, and where its steps ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HallSweepEntry {
+    /// Where samples were taken, in the order of time, in the drive's coordinates before the origin became zero,
+    /// metres. Of a long search not every sample is kept.
+    pub positions_m: Vec<f64>,
+    /// What the even sensor showed there, volts.
+    pub peak_v: Vec<f64>,
+    /// What the odd one showed, volts.
+    pub slope_v: Vec<f64>,
+    /// Where the even sensor was highest (G7), metres.
+    pub peak_m: f64,
+    /// What it showed there (V1max), volts.
+    pub peak_max_v: f64,
+    /// G1 with P1.
+    pub g1: HeldEntry,
+    /// G2 with P2.
+    pub g2: HeldEntry,
+    /// G8 with P0.
+    pub p0: HeldEntry,
+}
+
+/// So many samples of a search are kept at most.
+const SAMPLES_MAX: usize = 200;
+
+impl HallSweepEntry {
+    /// Of a search that found its zero.
+    pub(crate) fn of(outcome: &Outcome) -> Self {
+        let held = |it: &Held| HeldEntry {
+            position_m: it.position.value(),
+            peak_v: it.peak.value(),
+            slope_v: it.slope.value(),
+        };
+        let samples = &outcome.samples;
+        let highest = samples.iter();
+        let highest = highest.max_by(|a, b| a.peak.value().total_cmp(&b.peak.value()));
+        let every = samples.len().div_ceil(SAMPLES_MAX).max(1);
+        let kept = || samples.iter().step_by(every);
+        Self {
+            positions_m: kept().map(|it| it.position.value()).collect(),
+            peak_v: kept().map(|it| it.peak.value()).collect(),
+            slope_v: kept().map(|it| it.slope.value()).collect(),
+            peak_m: highest
+                .map_or(outcome.p0.position, |it| it.position)
+                .value(),
+            peak_max_v: outcome.peak_max.value(),
+            g1: held(&outcome.g1),
+            g2: held(&outcome.g2),
+            p0: held(&outcome.p0),
+        }
+    }
+}
+
+/// How late the SYNCs of a bus were since the program was connected, when a run ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SyncsEntry {
+    /// The bus.
+    pub bus: String,
+    /// How many were sent.
+    pub sent: u64,
+    /// How many were left out because they were more than half a period late.
+    pub skipped: u64,
+    /// Which share of them was no later than what stands in `late_s` at the same place.
+    pub shares: Vec<f64>,
+    /// Seconds; the last one is the latest of all.
+    pub late_s: Vec<f64>,
+}
+
+/// The shares of SYNCs whose lateness is kept; the last one is the latest of all.
+const SHARES: [f64; 4] = [0.5, 0.99, 0.999, 1.0];
+
+impl SyncsEntry {
+    /// Of each bus whose SYNCs a thread sends: where time is simulated none is late.
+    pub(super) fn of(buses: Vec<BusFigures>) -> Vec<Self> {
+        let each = buses.into_iter();
+        each.filter_map(|it| {
+            let sync = it.sync?;
+            let late = SHARES.map(|share| sync.lateness.percentile(share).as_secs_f64());
+            Some(Self {
+                bus: it.name,
+                sent: sync.sent,
+                skipped: sync.skipped,
+                shares: SHARES.to_vec(),
+                late_s: late.to_vec(),
+            })
+        })
+        .collect()
+    }
 }
 
 /// How far the stage of a gantry was turned.

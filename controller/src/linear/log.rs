@@ -1,13 +1,16 @@
 //! Journals of a linear axis: each line by itself, and against those before it.
 
 use machine::records::sound::{
-    ANGLE_RAD, ANGLE_U_RAD, ERROR_U_M, Judged, LENGTH_M, PASSES_MAX, PLACE_M, RATIO, SECONDS,
-    VOLTS, approach, as_many, counted, is, number, numbers, once, optional, unsound,
+    ANGLE_RAD, ANGLE_U_RAD, COUNT_MAX, ERROR_U_M, Judged, LENGTH_M, PASSES_MAX, PLACE_M, RATIO,
+    SECONDS, VOLTS, approach, as_many, counted, is, number, numbers, once, optional, unsound,
 };
 use machine::records::{ClosureEntry, JournalHeader, Log};
 use serde::{Deserialize, Serialize};
 
-use crate::linear::{JobEntry, PointEntry, ReachedEntry, RotationEntry, WentOnEntry, ZeroEntry};
+use crate::linear::{
+    CriterionEntry, HallSweepEntry, JobEntry, PointEntry, ReachedEntry, RotationEntry, SyncsEntry,
+    WentOnEntry, ZeroEntry,
+};
 use crate::store::budget::FREEDOM;
 
 /// A line of such a journal.
@@ -16,6 +19,12 @@ use crate::store::budget::FREEDOM;
 pub enum LinearEntry {
     /// A measured point.
     Point(PointEntry),
+    /// By what a verification is judged.
+    Criterion(CriterionEntry),
+    /// What a zero search read on its way.
+    HallSweep(HallSweepEntry),
+    /// How late the SYNCs of a bus were.
+    Syncs(SyncsEntry),
     /// A zero.
     Zero(ZeroEntry),
     /// How far the stage of a gantry was turned.
@@ -35,6 +44,12 @@ pub enum LinearEntry {
 pub struct LinearLog {
     /// Its points, in the order they were measured.
     pub points: Vec<PointEntry>,
+    /// By what it is judged, if it is a verification.
+    pub criterion: Option<CriterionEntry>,
+    /// What zero searches read on their way.
+    pub sweeps: Vec<HallSweepEntry>,
+    /// How late the SYNCs of each bus were.
+    pub syncs: Vec<SyncsEntry>,
     /// Its zeros.
     pub zeros: Vec<ZeroEntry>,
     /// How far a gantry's stage was turned.
@@ -57,6 +72,9 @@ impl Log for LinearLog {
     fn judge(&self, header: &JournalHeader, entry: &LinearEntry) -> Judged {
         match entry {
             LinearEntry::Point(it) => point(header, it),
+            LinearEntry::Criterion(it) => criterion(it),
+            LinearEntry::HallSweep(it) => hall_sweep(it),
+            LinearEntry::Syncs(it) => syncs(it),
             LinearEntry::Zero(it) => zero(it),
             LinearEntry::Rotation(it) => rotation(it),
             LinearEntry::Closed(it) => it.judge(header),
@@ -69,6 +87,9 @@ impl Log for LinearLog {
     fn take(&mut self, entry: LinearEntry) {
         match entry {
             LinearEntry::Point(it) => self.points.push(it),
+            LinearEntry::Criterion(it) => self.criterion = Some(it),
+            LinearEntry::HallSweep(it) => self.sweeps.push(it),
+            LinearEntry::Syncs(it) => self.syncs.push(it),
             LinearEntry::Zero(it) => self.zeros.push(it),
             LinearEntry::Rotation(it) => self.rotations.push(it),
             LinearEntry::Closed(it) => self.closures.push(it),
@@ -117,6 +138,46 @@ fn point(header: &JournalHeader, it: &PointEntry) -> Judged {
     number("scatter_m", it.scatter_m, &ERROR_U_M)?;
     number("at_s", it.at_s, &SECONDS)?;
     it.environment.judge("environment")
+}
+
+fn criterion(it: &CriterionEntry) -> Judged {
+    number("tolerance_m", it.tolerance_m, &ERROR_U_M)?;
+    counted("targets", it.targets.len(), 0..=COUNT_MAX)?;
+    for target in &it.targets {
+        number("targets.position_m", target.position_m, &PLACE_M)?;
+        for side in [target.forward, target.reverse].into_iter().flatten() {
+            number("targets.u_m", side.u_m, &ERROR_U_M)?;
+            number("targets.expanded_u_m", side.expanded_u_m, &ERROR_U_M)?;
+            optional(
+                "targets.degrees_of_freedom",
+                side.degrees_of_freedom,
+                &FREEDOM,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn hall_sweep(it: &HallSweepEntry) -> Judged {
+    numbers("positions_m", &it.positions_m, &PLACE_M)?;
+    for (key, volts) in [("peak_v", &it.peak_v), ("slope_v", &it.slope_v)] {
+        as_many(key, volts.len(), it.positions_m.len(), "the positions")?;
+        numbers(key, volts, &VOLTS)?;
+    }
+    number("peak_m", it.peak_m, &PLACE_M)?;
+    number("peak_max_v", it.peak_max_v, &VOLTS)?;
+    for (key, held) in [("g1", &it.g1), ("g2", &it.g2), ("p0", &it.p0)] {
+        number(format!("{key}.position_m"), held.position_m, &PLACE_M)?;
+        number(format!("{key}.peak_v"), held.peak_v, &VOLTS)?;
+        number(format!("{key}.slope_v"), held.slope_v, &VOLTS)?;
+    }
+    Ok(())
+}
+
+fn syncs(it: &SyncsEntry) -> Judged {
+    numbers("shares", &it.shares, &RATIO)?;
+    as_many("late_s", it.late_s.len(), it.shares.len(), "the shares")?;
+    numbers("late_s", &it.late_s, &SECONDS)
 }
 
 fn zero(it: &ZeroEntry) -> Judged {

@@ -15,10 +15,10 @@ use crate::linear::cross_check::{CrossCheck, DatumReadings, Plausible, WholeRun,
 use crate::linear::datum_in_use::Datum;
 use crate::linear::run_plan::RunPlan;
 use crate::linear::stage::LinearStage;
-use crate::linear::{LinearEntry, LinearLog};
+use crate::linear::{LinearEntry, LinearLog, SyncsEntry};
 use crate::store::ClosureEntry;
 use crate::store::{EnvironmentRecord, Journal};
-use machine::Stage;
+use machine::{Stage, bus_figures};
 
 /// How a series is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,6 +213,9 @@ impl LinearStage<'_> {
             runs.points.extend(&whole.points);
             runs.closures.push(closure);
             before = Some(whole);
+        }
+        for it in SyncsEntry::of(bus_figures(self.core.machine)) {
+            session.journal.write(&LinearEntry::Syncs(it))?;
         }
         session.journal.complete()?;
         session.journal.flush_to_disk()?;

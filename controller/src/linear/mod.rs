@@ -62,7 +62,8 @@ pub(crate) use config::{
 };
 pub(crate) use datum_in_use::Datum;
 pub(crate) use entries::{
-    JobEntry, PointEntry, ReachedEntry, RotationEntry, WentOnEntry, ZeroEntry,
+    CriterionEntry, HallSweepEntry, HeldEntry, JobEntry, PointEntry, ReachedEntry, RotationEntry,
+    SyncsEntry, WentOnEntry, ZeroEntry,
 };
 pub(crate) use finding::PatternFinding;
 #[cfg(feature = "program")]

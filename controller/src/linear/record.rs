@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 use units::{Approach, Metres};
 
 use crate::store::StoreError;
-#[cfg(feature = "program")]
-pub(crate) use budget::PlaceRecord;
-pub(crate) use budget::{BudgetRecord, CombinedRecord};
+pub(crate) use budget::{BudgetRecord, CombinedRecord, PlaceRecord};
 
 /// An error table as it is stored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -10,9 +10,11 @@ use units::{Approach, Metres};
 use crate::failure::Failure;
 use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured};
+use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
 use crate::linear::worse::likely_cause;
+use crate::linear::{CriterionEntry, LinearEntry};
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
 use machine::Stage;
@@ -113,6 +115,12 @@ impl LinearStage<'_> {
             options.resume.as_ref(),
             self.core.config_hash,
         )?;
+        let tolerance = Metres::from_um(config.accuracy_tolerance_um);
+        let uncertainty: Vec<UncertaintyAtTarget> = match options.compensated {
+            true => plan.targets.iter().map(|it| self.at_target(*it)).collect(),
+            false => Vec::new(),
+        };
+        journal.write(&LinearEntry::Criterion(criterion(tolerance, &uncertainty)))?;
         let measuring = MeasureOptions {
             stage: Stage::Verify,
             compensated: options.compensated,
@@ -124,11 +132,8 @@ impl LinearStage<'_> {
             figures: iso230::evaluate(&measured.series()?)?,
             journal: journal.path().to_owned(),
             measured,
-            tolerance: Metres::from_um(config.accuracy_tolerance_um),
-            uncertainty: match options.compensated {
-                true => plan.targets.iter().map(|it| self.at_target(*it)).collect(),
-                false => Vec::new(),
-            },
+            tolerance,
+            uncertainty,
         };
         if options.compensated {
             self.judge_benefit(store, &verified, options.calibration.as_deref())
@@ -191,6 +196,19 @@ impl LinearStage<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+/// As the journal has it.
+fn criterion(tolerance: Metres, uncertainty: &[UncertaintyAtTarget]) -> CriterionEntry {
+    let record = |it: &UncertaintyAtTarget| PlaceRecord {
+        position_m: it.target.value(),
+        forward: it.forward.as_ref().map(CombinedRecord::from),
+        reverse: it.reverse.as_ref().map(CombinedRecord::from),
+    };
+    CriterionEntry {
+        tolerance_m: tolerance.value(),
+        targets: uncertainty.iter().map(record).collect(),
     }
 }
 

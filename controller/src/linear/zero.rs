@@ -23,11 +23,12 @@ use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::homing;
 use crate::linear::ZeroConfig;
-use crate::linear::ZeroEntry;
 use crate::linear::passes::{SEARCHED, STEPS};
 use crate::linear::stage::{LinearStage, gantry_of};
 use crate::linear::zero_budget;
+use crate::linear::{HallSweepEntry, ZeroEntry};
 use crate::linear::{LinearEntry, LinearLog};
+use crate::made_by::made_by;
 use crate::run::utc_now;
 use crate::run::{missing, note_failure};
 use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, read_journal};
@@ -146,6 +147,7 @@ impl LinearStage<'_> {
         let passes = self.passes(config, &settings, &outcome)?;
         let (estimate, budget) = self.estimate(config, &settings, &outcome, &passes)?;
         let entry = self.zero_entry(&estimate, &budget);
+        journal.write(&LinearEntry::HallSweep(HallSweepEntry::of(&outcome)))?;
         journal.write(&LinearEntry::Zero(entry.clone()))?;
         self.adopt_zero(config, estimate.origin)?;
         self.core
@@ -327,6 +329,7 @@ impl LinearStage<'_> {
             drive: here.drive,
             instrument: InstrumentRecord::default(),
             started: utc_now(),
+            program: Some(made_by()),
             calibration: None,
             targets_m: Vec::new(),
             runs: 0,

@@ -3,6 +3,7 @@
 use units::Metres;
 
 use crate::failure::Failure;
+use crate::made_by::made_by;
 use crate::platform::ArrangementEntry;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::{PlatformEntry, PlatformLog};
@@ -48,6 +49,7 @@ impl AlignmentPlatform<'_> {
             drive: IdentityRecord::default(),
             instrument: self.camera_record()?,
             started: utc_now(),
+            program: Some(made_by()),
             calibration,
             targets_m: Vec::new(),
             runs,

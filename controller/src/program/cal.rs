@@ -1,6 +1,6 @@
 //! `truestage cal`: what is stored, what is in use, and back again.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 use machine::records::{Glance, Lease, Store, short};
@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::config::Loaded;
 use crate::program::belongs::head_of;
+use crate::program::cal_page;
 use crate::program::controls::export::{self, ExportArgs};
 use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kind::KINDS;
@@ -38,6 +39,9 @@ pub(crate) enum CalCommand {
         before: String,
         /// The newer one.
         after: String,
+        /// Write a page of both, with their curves over each other, to this file.
+        #[arg(long, value_name = "FILE")]
+        page: Option<PathBuf>,
     },
     /// Use this calibration from now on.
     Activate {
@@ -68,7 +72,8 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
             config,
             before,
             after,
-        } => diff(&opened(config)?, before, after, output),
+            page,
+        } => diff(&opened(config)?, [before, after], page.as_deref(), output),
         CalCommand::Activate { config, id } => activate(config, id, output),
         CalCommand::Rollback { config, axis } => rollback(config, axis, output),
         CalCommand::Export(args) => export::run(args, output),
@@ -76,7 +81,7 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
     }
 }
 
-fn opened(config: &std::path::Path) -> Result<Store, Failure> {
+fn opened(config: &Path) -> Result<Store, Failure> {
     let loaded = config::load(config)?;
     Ok(loaded.config.machine.store())
 }
@@ -151,9 +156,31 @@ fn of_kind(kind: &str) -> Shown {
     *own.expect("a test looks for each kind that is stored")
 }
 
-fn diff(store: &Store, before: &str, after: &str, output: Output) -> Ended {
-    let (text, value) = compared(store, before, after, output)?;
+fn diff(store: &Store, [before, after]: [&str; 2], page: Option<&Path>, output: Output) -> Ended {
+    let (mut text, mut value) = compared(store, before, after, output)?;
+    if let Some(path) = page {
+        let html = compared_page(store, [before, after], &text)?;
+        std::fs::write(path, html).map_err(|source| Failure::File {
+            path: path.to_owned(),
+            source,
+        })?;
+        text += &format!("\npage in {}", path.display());
+        value["page"] = json!(path);
+    }
     output.result(&text, &value)
+}
+
+/// Two calibrations on a page; `lines` are what the screen says of them.
+fn compared_page(store: &Store, both: [&str; 2], lines: &str) -> Result<String, Failure> {
+    let [before, after] = both.map(|it| store.resolve(it));
+    let (before, after) = (before?, after?);
+    let (old, new) = (store.glance(&before)?, store.glance(&after)?);
+    let drawn = (of_kind(new.kind).drawn)(store, &before, &after)?;
+    Ok(cal_page::html(
+        [(&before, &old), (&after, &new)],
+        lines,
+        &drawn,
+    ))
 }
 
 /// Two calibrations, as text and as JSON.
@@ -178,14 +205,14 @@ pub(crate) fn compared(
     Ok((lines.join("\n"), json!({"changes": values})))
 }
 
-fn activate(path: &std::path::Path, id: &str, output: Output) -> Ended {
+fn activate(path: &Path, id: &str, output: Output) -> Ended {
     let (axis, id) = put_into_use(path, id)?;
     let text = format!("axis {axis}: {} is in use", short(&id));
     output.result(&text, &json!({"axis": axis, "active": id}))
 }
 
 /// The axis and the whole name. The stage and the configuration are checked here; the drive itself when it is used.
-fn put_into_use(path: &std::path::Path, id: &str) -> Result<(String, String), Failure> {
+fn put_into_use(path: &Path, id: &str) -> Result<(String, String), Failure> {
     let loaded = config::load(path)?;
     let store = loaded.config.machine.store();
     // Whoever measures with a calibration must find it there to the end.
@@ -211,7 +238,7 @@ fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
     }))
 }
 
-fn rollback(path: &std::path::Path, axis: &str, output: Output) -> Ended {
+fn rollback(path: &Path, axis: &str, output: Output) -> Ended {
     let loaded = config::load(path)?;
     let store = loaded.config.machine.store();
     let _lease = Lease::take(&store, "cal rollback")?;

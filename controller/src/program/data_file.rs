@@ -9,6 +9,7 @@ use machine::records::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead, SCHEMA_VERSION,
 };
 
+use crate::made_by::made_by;
 use crate::program::data_text::name_of;
 use crate::run::utc_now;
 use crate::volumetric::VolumetricFailure;
@@ -77,7 +78,7 @@ fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> R
         resolution_m: None,
         resolution_rad: None,
         created: utc_now(),
-        program: format!("truestage {}", env!("CARGO_PKG_VERSION")),
+        program: made_by(),
         source: name_of(Path::new(data.file_name().unwrap_or_default())),
         instrument: InstrumentRecord {
             name: "measured elsewhere".into(),

@@ -7,6 +7,7 @@ mod before;
 mod belongs;
 mod budget;
 mod cal;
+mod cal_page;
 mod check;
 mod controls;
 mod data;
@@ -59,7 +60,7 @@ use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, V
 use wire::lockstep::path_of;
 
 use crate::ports::Pace;
-use crate::{Agreed, Failure};
+use crate::{Agreed, Failure, made_by};
 use intended::Intent;
 use output::Output;
 use rotary::readings::ReadingsArgs;
@@ -428,6 +429,7 @@ pub fn main(
     enrol: fn(NewToken) -> Result<String, crate::Failure>,
     version: &'static str,
 ) -> ExitCode {
+    made_by::this_is(version);
     let words = Cli::command().version(version).get_matches();
     let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
     let output = Output::new(cli.json);

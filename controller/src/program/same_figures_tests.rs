@@ -1,6 +1,8 @@
 //! A figure is the same wherever it is shown: each kind of machine is calibrated and verified in virtual time, and
 //! what its text, its JSON, its pages and its records say of it is read again and compared, figure by figure.
 
+use std::path::Path;
+
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -10,6 +12,7 @@ use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::PlatformVerified;
 use crate::program::kind::KINDS;
 use crate::program::linear::told as linear;
+use crate::program::page::head::ALWAYS;
 use crate::program::platform::verbs as platform;
 use crate::program::report;
 use crate::program::rotary::told as rotary;
@@ -68,6 +71,21 @@ fn words(html: &str) -> String {
     }
     words += rest;
     words.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The page of the journal at `path`; every page says the same things first, whatever its kind.
+#[track_caller]
+fn page_of(path: &Path) -> String {
+    let html = report::html(path).unwrap();
+    let head = &html[..html.find("</table>").unwrap()];
+    let mut rest = head;
+    for name in ALWAYS {
+        let row = format!("<th>{name}</th><td>");
+        let at = rest.find(&row);
+        rest = &rest[at.unwrap_or_else(|| panic!("`{name}` is not at its place in {head}"))..];
+    }
+    assert!(head.contains("truestage ") && head.contains("BLAKE3: journal "));
+    words(&html)
 }
 
 /// The figures behind each `label` in `text`, with their decimals.
@@ -212,8 +230,10 @@ fn a_linear_axis_is_told_by_the_same_figures_everywhere() {
         })
         .unwrap();
     check_zero(&zeroed);
+    check_search(&zeroed);
     check_linear_calibration(&desk, &calibrated);
     check_linear_verification(&verified);
+    check_linear_comparison(&calibrated, &verified);
 }
 
 #[track_caller]
@@ -233,7 +253,7 @@ fn check_linear_calibration(desk: &Desk, calibrated: &Calibrated) {
         linear::calibrated_text(calibrated),
         linear::calibrated_value(calibrated),
     );
-    let page = words(&report::html(&calibrated.journal).unwrap());
+    let page = page_of(&calibrated.journal);
     let (lines, record) = desk.shown(&calibrated.id);
     let content = &record;
 
@@ -297,7 +317,7 @@ fn check_linear_verification(verified: &Verified) {
         linear::verified_text("as_left", verified),
         linear::verified_value("as_left", verified),
     );
-    let page = words(&report::html(&verified.journal).unwrap());
+    let page = page_of(&verified.journal);
     let places = [
         "accuracy/bidirectional",
         "accuracy/forward",
@@ -310,6 +330,23 @@ fn check_linear_verification(verified: &Verified) {
         "reversal_value",
         "mean_reversal_value",
     ];
+    let drawn = report::html(&verified.journal).unwrap();
+    for (symbol, place) in [
+        ("A", "accuracy/bidirectional"),
+        ("E", "systematic_deviation/bidirectional"),
+        ("M", "mean_bidirectional_deviation_range"),
+        ("R", "repeatability/bidirectional"),
+        ("B", "reversal_value"),
+    ] {
+        let label = format!("data-figure=\"{symbol}\">");
+        everywhere(at(&json, &format!("/as_left/{place}")), &[(&drawn, &label)]);
+    }
+    check_targets(&json, &page);
+    let stated = page
+        .find("uncertainty U (k = 2) of the corrected position")
+        .unwrap();
+    assert!(text.contains(&page[stated..page[stated..].find(" tolerance").unwrap() + stated]));
+    everywhere(at(&json, "/tolerance_um"), &[(&page, "µm, tolerance ")]);
     assert_eq!(ROWS.len(), places.len());
     for ((name, ..), place) in ROWS.iter().zip(places) {
         let figure = at(&json, &format!("/as_left/{place}"));
@@ -322,6 +359,90 @@ fn check_linear_verification(verified: &Verified) {
             (&page, "datum after the runs closure "),
         ],
     );
+}
+
+/// Each target's row on the page.
+#[track_caller]
+fn check_targets(json: &Value, page: &str) {
+    let targets = list(json, "/as_left/targets");
+    let uncertain = list(json, "/uncertainty");
+    let rows = behind(page, "U ↓, k = 2 (µm)", targets.len() * 9);
+    for ((row, target), uncertain) in rows.chunks(9).zip(targets).zip(uncertain) {
+        let figures = [
+            "/mean_deviation/forward",
+            "/mean_deviation/reverse",
+            "/standard_deviation/forward",
+            "/standard_deviation/reverse",
+            "/reversal_value",
+            "/repeatability/bidirectional",
+        ];
+        check("target", at(target, "/target_mm"), row[0]);
+        for (place, printed) in figures.into_iter().zip(&row[1..]) {
+            check(place, at(target, place), *printed);
+        }
+        check("U forward", at(uncertain, "/forward/expanded_um"), row[7]);
+        check("U reverse", at(uncertain, "/reverse/expanded_um"), row[8]);
+    }
+}
+
+/// The calibration's run and the verification's side by side.
+#[track_caller]
+fn check_linear_comparison(calibrated: &Calibrated, verified: &Verified) {
+    let both = [calibrated.journal.as_path(), verified.journal.as_path()];
+    let (html, figures) = report::compared(both).unwrap();
+    let (page, json) = (words(&html), linear::verified_value("as_left", verified));
+    let figures = figures.as_array().unwrap();
+    assert!(figures.len() > ROWS.len());
+    for (row, (name, symbol, _)) in figures.iter().zip(ROWS) {
+        assert_eq!(row["name"], format!("{symbol}, {name}"));
+        let printed = behind(&page, &format!("{name} (µm)"), 3);
+        for (key, printed) in ["/first", "/second", "/difference"]
+            .into_iter()
+            .zip(printed)
+        {
+            check(name, at(row, key), printed);
+        }
+    }
+    assert_eq!(
+        at(&figures[0], "/second"),
+        at(&json, "/as_left/accuracy/bidirectional")
+    );
+    assert_eq!(
+        html.matches("run: ").count(),
+        4,
+        "both plots, and their titles"
+    );
+}
+
+/// The zero's journal: where the steps of its search ended.
+#[track_caller]
+fn check_search(zeroed: &Zeroed) {
+    let json = linear::zeroed("x", zeroed).value;
+    let page = page_of(&zeroed.journal);
+    let table = &page[page.find("place (µm) voltage (V)").unwrap()..];
+    for (name, place, sensor) in [
+        ("G7", "g7", "peak_v"),
+        ("G1", "g1_p1", "peak_v"),
+        ("G2", "g2_p2", "peak_v"),
+        ("G8", "g8_p0", "peak_v"),
+        ("P1", "g1_p1", "slope_v"),
+        ("P2", "g2_p2", "slope_v"),
+        ("P0", "g8_p0", "slope_v"),
+    ] {
+        let printed = behind(table, &format!("{name} "), 2);
+        check(
+            name,
+            at(&json, &format!("/search/{place}/position_um")),
+            printed[0],
+        );
+        check(
+            name,
+            at(&json, &format!("/search/{place}/{sensor}")),
+            printed[1],
+        );
+    }
+    let u = at(&json, "/zero/origin_um_u");
+    everywhere(2.0 * u, &[(&page, "of the zero: U (k = 2) ")]);
 }
 
 #[test]
@@ -350,7 +471,7 @@ fn check_platform_calibration(desk: &Desk, calibrated: &PlatformCalibrated) {
         platform::calibrated_text(calibrated),
         platform::calibrated_value(calibrated),
     );
-    let page = words(&report::html(&calibrated.journal).unwrap());
+    let page = page_of(&calibrated.journal);
     let closure = at(&json, "/closure_um");
     everywhere(
         closure,
@@ -416,7 +537,7 @@ fn check_platform_verification(verified: &PlatformVerified) {
         platform::verified_text("as left", verified),
         platform::verified_value(verified),
     );
-    let page = words(&report::html(&verified.journal).unwrap());
+    let page = page_of(&verified.journal);
     everywhere(
         at(&json, "/largest_um"),
         &[(&text, "largest error "), (&page, "largest error (µm) ")],
@@ -499,7 +620,7 @@ fn check_rotary_calibration(desk: &Desk, calibrated: &RotaryCalibrated) {
         rotary::calibrated_text(calibrated),
         rotary::calibrated_value(calibrated),
     );
-    let page = words(&report::html(&calibrated.journal).unwrap());
+    let page = page_of(&calibrated.journal);
     let (lines, record) = desk.shown(&calibrated.id);
     let content = &record;
     let most = at(&json, "/largest_deviation_arcsec");
@@ -528,6 +649,7 @@ fn check_rotary_calibration(desk: &Desk, calibrated: &RotaryCalibrated) {
             (&page, "standard uncertainty "),
         ],
     );
+    check_harmonics(&json, &page);
     let closure = at(&json, "/closure_arcsec");
     everywhere(
         closure,
@@ -564,7 +686,7 @@ fn check_rotary_verification(verified: &RotaryVerified) {
         rotary::verified_text(verified),
         rotary::verified_value(verified),
     );
-    let page = words(&report::html(&verified.journal).unwrap());
+    let page = page_of(&verified.journal);
     for (state, name) in [("as_found", "as found"), ("as_left", "as left")] {
         let own_text = &text[text.find(name).unwrap()..];
         let table = &page[page.find("largest (″)").unwrap()..];
@@ -580,8 +702,9 @@ fn check_rotary_verification(verified: &RotaryVerified) {
     }
     everywhere(
         at(&json, "/tolerance_arcsec"),
-        &[(&text, "tolerance "), (&page, "tolerance ")],
+        &[(&text, "tolerance "), (&page, "″, tolerance ")],
     );
+    check_bidirectional(&json, &page);
     let closure = at(&json, "/closure_arcsec");
     everywhere(closure, &[(&text, "it moved by ")]);
     // Offset, passes, readings, not read, moved meanwhile.
@@ -592,6 +715,33 @@ fn check_rotary_verification(verified: &RotaryVerified) {
         closure.abs(),
         behind(&page, "The plate moved by ", 1)[0],
     );
+}
+
+#[track_caller]
+fn check_harmonics(json: &Value, page: &str) {
+    let all = list(json, "/harmonics");
+    let mut largest: Vec<&Value> = all.iter().collect();
+    largest.sort_by(|a, b| at(b, "/amplitude_arcsec").total_cmp(&at(a, "/amplitude_arcsec")));
+    let rows = behind(page, "U, k = 2 (″) phase (°)", 4 * 12);
+    for (row, it) in rows.chunks(4).zip(largest) {
+        check("number", at(it, "/number"), row[0]);
+        check("amplitude", at(it, "/amplitude_arcsec"), row[1]);
+        check("U", 2.0 * at(it, "/standard_uncertainty_arcsec"), row[2]);
+        check("phase", at(it, "/phase_deg"), row[3]);
+    }
+    let significant = all.iter().filter(|it| it["significant"] == true).count();
+    everywhere(significant as f64, &[(page, "Harmonics ")]);
+}
+
+#[track_caller]
+fn check_bidirectional(json: &Value, page: &str) {
+    for (key, label) in [
+        ("mean_reversal", "is late by included B̄ "),
+        ("reversal_variation", "largest difference from it "),
+    ] {
+        let figure = at(json, &format!("/bidirectional/{key}_arcsec"));
+        everywhere(figure, &[(page, label)]);
+    }
 }
 
 #[test]
@@ -627,7 +777,7 @@ fn check_volumetric_calibration(desk: &Desk, made: &VolumetricCalibrated) {
         volumetric::calibrated_text(made),
         volumetric::calibrated_value(made),
     );
-    let page = words(&report::html(&made.journal).unwrap());
+    let page = page_of(&made.journal);
     let (lines, record) = desk.shown(&made.id);
     let content = &record;
     let all = [text.as_str(), &page, &lines];
@@ -679,11 +829,14 @@ fn check_volumetric_verification(verified: &VolumetricVerified) {
         volumetric::verified_text(verified),
         volumetric::verified_value(verified),
     );
-    let page = words(&report::html(&verified.journal).unwrap());
+    let page = page_of(&verified.journal);
     for (key, label) in [("range_um", "range "), ("limit_um", "tolerance ")] {
         everywhere(
             at(&json, &format!("/{key}")),
-            &[(&text, label), (&page, label)],
+            &[
+                (&text, label),
+                (&page[page.find("Line as left").unwrap()..], label),
+            ],
         );
     }
     let points = list(&json, "/points");

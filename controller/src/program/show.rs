@@ -15,12 +15,19 @@ pub(crate) trait Show: Content {
 
     /// What is otherwise in `after`; `None` for what is not compared.
     fn changes(&self, after: &Self) -> Option<Changes>;
+
+    /// What both look like, for a page; nothing where there is nothing to draw.
+    fn drawn(&self, _after: &Self) -> String {
+        String::new()
+    }
 }
 
 /// A stored calibration in lines, and as it lies in its file.
 type One = fn(&Store, &str) -> Result<(String, Value), Failure>;
 /// What is otherwise in the second; `None` for what is not compared.
 type Two = fn(&Store, &str, &str) -> Result<Option<Changes>, Failure>;
+/// What two look like.
+type Drawn = fn(&Store, &str, &str) -> Result<String, Failure>;
 
 /// A kind of content that can be shown.
 #[derive(Clone, Copy)]
@@ -28,6 +35,7 @@ pub(crate) struct Shown {
     pub(crate) kind: &'static str,
     pub(crate) one: One,
     pub(crate) two: Two,
+    pub(crate) drawn: Drawn,
 }
 
 impl Shown {
@@ -36,6 +44,7 @@ impl Shown {
             kind: C::KIND,
             one: one::<C>,
             two: two::<C>,
+            drawn: drawn::<C>,
         }
     }
 }
@@ -49,4 +58,9 @@ fn one<C: Show>(store: &Store, id: &str) -> Result<(String, Value), Failure> {
 fn two<C: Show>(store: &Store, before: &str, after: &str) -> Result<Option<Changes>, Failure> {
     let (before, after) = (store.load::<C>(before)?, store.load::<C>(after)?);
     Ok(before.content.changes(&after.content))
+}
+
+fn drawn<C: Show>(store: &Store, before: &str, after: &str) -> Result<String, Failure> {
+    let (before, after) = (store.load::<C>(before)?, store.load::<C>(after)?);
+    Ok(before.content.drawn(&after.content))
 }

@@ -8,6 +8,7 @@ use super::answering::Asked;
 use super::demo::stand::Demo;
 use super::intended::{Intent, Step};
 use super::output::{Ended, Output};
+use super::page::compare::Comparison;
 use super::show::Shown;
 use super::targets::AskedMotion;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
@@ -47,4 +48,6 @@ pub(crate) struct Verbs {
     pub(crate) opened_by: &'static [&'static str],
     /// The page of the journal at a path.
     pub(crate) page: fn(&Path) -> Result<String, Failure>,
+    /// Two of its journals side by side.
+    pub(crate) compare: fn([&Path; 2]) -> Result<Comparison, Failure>,
 }

@@ -100,4 +100,7 @@ pub struct JudgedEntry {
     pub left_rad: Option<Vec<Option<f64>>>,
     /// The tolerance.
     pub tolerance_rad: f64,
+    /// What of the deviations is the scatter of the readings, rms; `None` where that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_rad: Option<f64>,
 }

@@ -240,6 +240,7 @@ fn placed(read: &PlateLog, it: &PlacementEntry) -> Judged {
 
 fn judged(read: &PlateLog, it: &JudgedEntry) -> Judged {
     once("judged", read.judged.is_none())?;
+    optional("noise_rad", it.noise_rad, &ANGLE_U_RAD)?;
     let lines = plan_of(read)?.lines as usize;
     as_many("found_rad", it.found_rad.len(), lines, "the lines")?;
     optionals("found_rad", &it.found_rad, &ANGLE_RAD)?;

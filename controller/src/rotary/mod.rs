@@ -13,6 +13,7 @@
 //! | pass | one turn over all lines, in one direction |
 
 mod asked;
+pub(crate) mod bidirectional;
 pub(crate) mod calibrate;
 pub(crate) mod check;
 mod config;
@@ -23,6 +24,8 @@ pub(crate) mod estimate;
 mod failure;
 #[cfg(test)]
 mod golden;
+#[cfg(feature = "program")]
+pub(crate) mod harmonics;
 mod in_use;
 mod kind;
 mod line_speed;

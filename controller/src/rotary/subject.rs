@@ -6,6 +6,7 @@ use units::{Radians, RadiansPerSecond};
 
 use crate::config::ConfigHash;
 use crate::failure::Failure;
+use crate::made_by::made_by;
 use crate::rotary::in_use::TableInUse;
 use crate::rotary::plate_run::PlateRun;
 use crate::rotary::settings;
@@ -77,6 +78,7 @@ impl Subject<'_> {
             drive: here.drive.clone(),
             instrument: plate_record(run),
             started: utc_now(),
+            program: Some(made_by()),
             calibration,
             targets_m: Vec::new(),
             runs: run.passes,

@@ -18,6 +18,7 @@ use core::f64::consts::TAU;
 use units::Radians;
 
 use crate::failure::Failure;
+use crate::rotary::bidirectional::Bidirectional;
 use crate::rotary::calibrate::Read;
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::in_use::TableInUse;
@@ -78,6 +79,8 @@ pub struct RotaryVerified {
     pub left: Option<RotaryFigures>,
     /// What of the rms is the scatter of this verification's own readings.
     pub noise: Option<Radians>,
+    /// What the directions of its passes differ by; `None` where no line was read in both.
+    pub bidirectional: Option<Bidirectional>,
     /// By how much the plate moved while it was read.
     pub closure: Radians,
     /// The tolerance of the configuration.
@@ -114,6 +117,7 @@ impl RotaryVerified {
             found_rad: of(&self.found),
             left_rad: self.left.as_ref().map(of),
             tolerance_rad: self.tolerance.value(),
+            noise_rad: self.noise.map(Radians::value),
         }
     }
 }
@@ -248,6 +252,11 @@ impl<'a> Verification<'a> {
             noise: placed
                 .scatter
                 .map(|it| it / (2.0 * f64::from(self.run.passes)).sqrt()),
+            bidirectional: Bidirectional::of(
+                &self.journal.so_far().sweeps,
+                placed.offset,
+                self.run.passes,
+            ),
             closure: placed.closure,
             tolerance: Radians::from_arcsec(self.config.tolerance_arcsec),
             journal: self.journal.path().to_owned(),

@@ -44,6 +44,9 @@ pub struct JournalHeader {
     pub instrument: InstrumentRecord,
     /// When, UTC, RFC 3339.
     pub started: String,
+    /// The program that writes it; `None` in journals of programs that did not say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
     /// The calibration in use, `None` for uncompensated moves.
     pub calibration: Option<String>,
     /// The targets of one run, metres.
@@ -299,6 +302,8 @@ pub struct ReadJournal<L> {
     pub valid_bytes: u64,
     /// Whether a torn line follows them.
     pub torn: bool,
+    /// BLAKE3 of the whole file, as it was read.
+    pub blake3: String,
 }
 
 fn same_run(
@@ -380,6 +385,7 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
     })?;
     read.valid_bytes = valid_bytes;
     read.torn = torn;
+    read.blake3 = blake3::hash(&bytes).to_hex().to_string();
     Ok(read)
 }
 
@@ -453,6 +459,7 @@ fn begin<L: Log>(
         failure: None,
         valid_bytes: 0,
         torn: false,
+        blake3: String::new(),
     })
 }
 

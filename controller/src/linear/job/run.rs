@@ -11,6 +11,7 @@ use crate::linear::job::plan::{interval, uncalibrated};
 use crate::linear::job::{GoOn, Job, JobInput, JobOperator, JobPoint, Reached};
 use crate::linear::stage::LinearStage;
 use crate::linear::{LinearEntry, LinearLog, ReachedEntry, WentOnEntry};
+use crate::made_by::made_by;
 use crate::run::{note_failure, utc_now};
 use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store};
 use machine::Stage;
@@ -116,6 +117,7 @@ impl LinearStage<'_> {
             drive: machine.drive,
             instrument: InstrumentRecord::default(),
             started: utc_now(),
+            program: Some(made_by()),
             calibration: Some(calibration.to_owned()),
             targets_m: job.points.iter().map(|it| it.target.value()).collect(),
             runs: job.repetitions,

@@ -1,6 +1,6 @@
 //! The linear stage: zero by Hall sensors, error table by interferometer, power cycles.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use compensator::iso230::Figures;
@@ -9,15 +9,14 @@ use serde_json::{Value, json};
 use units::{Metres, Time, Volts};
 
 use crate::emulated::{DriftLimits, HallDrift};
-use crate::linear::ZeroEntry;
 use crate::linear::{Calibrated, LinearLog, Verified, VerifyOptions, Zeroed};
 use crate::program::demo::emulation::Emulation;
 use crate::program::demo::stand::{
     Demo, DemoArgs, Show, Shown, Stand, power_cycle, shipped, took, write_page,
 };
+use crate::program::linear::page::section;
 use crate::program::linear::report::{self, Page, Section};
 use crate::program::output::Output;
-use crate::program::page::facts_of;
 use crate::program::{json as to_json, text};
 use crate::run::CalibrateOptions;
 use crate::{Failure, Machine};
@@ -225,34 +224,26 @@ fn to_value(story: &Story, report: &std::path::Path, wall: Duration) -> Value {
 }
 
 fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
-    let journal = read_journal::<LinearLog>(&story.left.journal)?;
-    let verified = [
-        ("as found", &story.found),
-        ("as left", &story.left),
-        ("after power cycles", &story.after),
-    ];
-    let sections = verified
-        .into_iter()
-        .map(|(title, verified)| Section {
-            title: title.to_owned(),
-            figures: &verified.figures,
-            points: &verified.measured.points,
-        })
-        .collect();
-    let zeros = story
-        .rezeros
-        .iter()
-        .filter_map(|it| read_journal::<LinearLog>(&it.zeroed.journal).ok())
-        .flat_map(|journal| journal.log.zeros)
-        .collect::<Vec<ZeroEntry>>();
+    let read = |path: &Path| read_journal::<LinearLog>(path);
+    let verified = [&story.found, &story.left, &story.after];
+    let titles = ["as found", "as left", "after power cycles"];
+    let journals = verified.map(|it| read(&it.journal));
+    let [found, left, after] = journals;
+    let journals = [found?, left?, after?];
+    let sections = titles.into_iter().zip(verified).zip(&journals);
+    let sections = sections.map(|((title, verified), journal)| Section {
+        title: title.to_owned(),
+        ..section(journal, &verified.figures)
+    });
+    let rezeros = story.rezeros.iter().map(|it| read(&it.zeroed.journal));
+    let rezeros: Vec<_> = rezeros.collect::<Result<_, _>>()?;
+    let [_, left, _] = &journals;
     let page = Page {
-        title: format!("truestage: axis {AXIS} of {}", journal.header.machine),
-        facts: facts_of(&journal, journal.log.points.len()),
-        sections,
+        title: format!("truestage: axis {AXIS} of {}", left.header.machine),
+        facts: report::head(left, Some(&story.left.figures), &[]),
+        sections: sections.collect(),
         calibration: Some(&story.calibrated.record.content),
-        zeros,
-        rotations: Vec::new(),
-        job: None,
+        logs: rezeros.iter().chain([left]).map(|it| &it.log).collect(),
     };
-    write_page(store, &journal.header, &report::render(&page))
+    write_page(store, &left.header, &report::render(&page))
 }

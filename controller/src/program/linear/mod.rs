@@ -1,5 +1,6 @@
 //! Linear axes on the command line.
 
+mod compare;
 pub(crate) mod demo;
 pub(crate) mod elsewhere;
 mod gantry;
@@ -52,4 +53,5 @@ pub(crate) const VERBS: Verbs = Verbs {
     shown: &[Shown::of::<LinearContent>()],
     opened_by: LinearLog::OPENED_BY,
     page: page::html,
+    compare: compare::compared,
 };

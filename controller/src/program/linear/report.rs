@@ -1,8 +1,15 @@
-//! The page of a linear axis: facts, deviations, figures of ISO 230-2, its table and its zeros.
+//! The page of a linear axis: its head, deviations with the figures of ISO 230-2, its table, its zeros, and what
+//! drifted.
 
-mod deviations;
+mod drift;
+mod error_table;
 mod gantry;
+mod hall;
+mod head;
+mod iso_plot;
 mod job;
+mod syncs;
+mod targets;
 mod uncertainty;
 
 use core::fmt::Write as _;
@@ -10,9 +17,12 @@ use core::fmt::Write as _;
 use compensator::iso230::Figures;
 use units::Metres;
 
-use crate::linear::{LinearContent, LinearLog, PointEntry, RotationEntry, ZeroEntry};
-use crate::program::page::{document, escape, facts};
+use crate::linear::{CriterionEntry, LinearContent, LinearLog, PointEntry, RotationEntry};
+use crate::program::page::head::{Fact, facts};
+use crate::program::page::{document, escape};
 use crate::program::text;
+
+pub(crate) use self::head::head;
 
 /// One measured series on the page.
 #[derive(Clone, Debug)]
@@ -23,6 +33,8 @@ pub(crate) struct Section<'a> {
     pub(crate) figures: &'a Figures,
     /// Its points.
     pub(crate) points: &'a [PointEntry],
+    /// By what it is judged.
+    pub(crate) criterion: Option<&'a CriterionEntry>,
 }
 
 /// What a page shows.
@@ -30,50 +42,82 @@ pub(crate) struct Section<'a> {
 pub(crate) struct Page<'a> {
     /// Heading.
     pub(crate) title: String,
-    /// Name and value, for the head of the page.
-    pub(crate) facts: Vec<(String, String)>,
+    /// The head of the page.
+    pub(crate) facts: Vec<Fact>,
     /// Measured series.
     pub(crate) sections: Vec<Section<'a>>,
-    /// The calibration in use.
+    /// The calibration that was made, or is in use.
     pub(crate) calibration: Option<&'a LinearContent>,
-    /// Zeros found, in order.
-    pub(crate) zeros: Vec<ZeroEntry>,
-    /// How far a gantry's stage was turned, each time.
-    pub(crate) rotations: Vec<RotationEntry>,
-    /// The journal of a job.
-    pub(crate) job: Option<&'a LinearLog>,
+    /// The journals whose zeros, drift and punctuality are shown.
+    pub(crate) logs: Vec<&'a LinearLog>,
 }
 
 /// The page as HTML.
 pub(crate) fn render(page: &Page<'_>) -> String {
     let mut html = facts(&page.facts);
-    if let Some((job, log)) = page.job.and_then(|it| Some((it.job.as_ref()?, it))) {
-        html += &job::html(job, log);
+    for log in &page.logs {
+        if let Some(job) = &log.job {
+            html += &job::html(job, log);
+        }
     }
-    if !page.sections.is_empty() {
-        html += "<h2>ISO 230-2 figures</h2>";
-        html += &figures(&page.sections);
-    }
-    for section in &page.sections {
-        html += &format!("<h2>Deviation {}</h2>", escape(&section.title));
-        html += &format!("<figure>{}</figure>", deviations::deviations(section));
-    }
+    html += &deviations(&page.sections);
     if let Some(calibration) = page.calibration {
         html += "<h2>Calibration</h2>";
-        html += &table(calibration);
+        html += &error_table::html(calibration);
         html += "<h3>Uncertainty</h3>";
         html += &uncertainty::html(calibration);
     }
-    if !page.zeros.is_empty() {
-        html += "<h2>Zeros</h2>";
-        html += &zeros(&page.zeros);
+    html += &zeros(&page.logs);
+    let rotations = page.logs.iter().flat_map(|it| &it.rotations);
+    html += &rotations.map(rotation).collect::<String>();
+    for log in &page.logs {
+        html += &drift::html(&log.closures, &log.points);
+        html += &syncs::html(&log.syncs);
     }
-    for rotation in &page.rotations {
-        html += "<h2>Rotation of the stage</h2>";
-        html += &gantry::html(rotation);
+    document(&page.title, &html, "")
+}
+
+fn rotation(it: &RotationEntry) -> String {
+    format!("<h2>Rotation of the stage</h2>{}", gantry::html(it))
+}
+
+/// The figures of all series, all at one scale, then each by itself.
+fn deviations(sections: &[Section<'_>]) -> String {
+    if sections.is_empty() {
+        return String::new();
     }
-    let note = "deviation = actual − target. Bars are mean ± 2 s at each target.";
-    document(&page.title, &html, note)
+    let mut html = format!("<h2>ISO 230-2 figures</h2>{}", figures(sections));
+    let extents: Vec<_> = sections.iter().map(iso_plot::extent).collect();
+    if sections.len() > 1 {
+        html += &at_one_scale(sections);
+    }
+    for (it, extent) in sections.iter().zip(extents) {
+        let _ = write!(html, "<h2>Deviation {}</h2>", escape(&it.title));
+        html += &plot(it, extent);
+        html += &targets::html(it);
+    }
+    html
+}
+
+/// The plots of all series, on axes that show each of them.
+pub(crate) fn at_one_scale(sections: &[Section<'_>]) -> String {
+    let extents = sections.iter().map(iso_plot::extent);
+    let all = extents.fold([0.0_f64, 0.0], |[low, high], it| {
+        [low.min(it[0]), high.max(it[1])]
+    });
+    let plots = sections.iter().map(|it| plot(it, all));
+    format!(
+        "<h2>Deviations at one scale</h2>{}",
+        plots.collect::<String>()
+    )
+}
+
+fn plot(section: &Section<'_>, extent: [f64; 2]) -> String {
+    format!(
+        "<figure><figcaption>{}</figcaption>{}</figure>",
+        escape(&section.title),
+        iso_plot::iso_plot(section, extent)
+    )
 }
 
 fn figures(sections: &[Section<'_>]) -> String {
@@ -98,53 +142,32 @@ fn figures(sections: &[Section<'_>]) -> String {
     html
 }
 
-fn table(content: &LinearContent) -> String {
-    let cell = |value: Option<f64>| {
-        value.map_or("–".to_owned(), |metres| {
-            format!("{:.3}", Metres(metres).um())
-        })
-    };
-    let mut html = format!(
-        "<p>{} positions, largest deviation {}, {} runs, {}</p><table><tr><th>position (mm)</th><th>deviation ↑ (µm)</th><th>deviation ↓ (µm)</th>\
-         <th>u ↑ (µm)</th><th>u ↓ (µm)</th></tr>",
-        content.nodes.len(),
-        content
-            .table("")
-            .map_or("–".into(), |it| format!("{:.3} µm", it.largest().um())),
-        content.runs,
-        text::closure(content.closure_m.map(Metres))
-    );
-    for node in &content.nodes {
-        let _ = write!(
-            html,
-            "<tr><td>{:.3}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            Metres(node.position_m).mm(),
-            cell(node.forward_m),
-            cell(node.reverse_m),
-            cell(node.forward_u_m),
-            cell(node.reverse_u_m)
-        );
+fn zeros(logs: &[&LinearLog]) -> String {
+    if logs.iter().all(|it| it.zeros.is_empty()) {
+        return String::new();
     }
-    html + "</table>"
-}
-
-fn zeros(zeros: &[ZeroEntry]) -> String {
     let mut html = String::from(
-        "<table><tr><th>no.</th><th>origin before (µm)</th><th>u (µm)</th><th>peak (V)</th>\
-         <th>mid voltage (V)</th></tr>",
+        "<h2>Zeros</h2><table><tr><th>no.</th><th>origin before (µm)</th><th>u (µm)</th><th>U, k = 2 (µm)</th>\
+         <th>peak (V)</th><th>mid voltage (V)</th></tr>",
     );
-    for (at, zero) in zeros.iter().enumerate() {
+    for (at, zero) in (1..).zip(logs.iter().flat_map(|it| &it.zeros)) {
+        let u = Metres(zero.standard_uncertainty_m).um();
         let _ = write!(
             html,
-            "<tr><td>{}</td><td>{:.3}</td><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td></tr>",
-            at + 1,
+            "<tr><td>{at}</td><td>{:.3}</td><td>{u:.3}</td><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td></tr>",
             Metres(zero.origin_m).um(),
-            Metres(zero.standard_uncertainty_m).um(),
+            2.0 * u,
             zero.peak_max_v,
             zero.mid_v
         );
     }
-    html + "</table>" + &uncertainty::of_last(zeros)
+    html += "</table>";
+    for log in logs {
+        for (at, sweep) in log.sweeps.iter().enumerate() {
+            html += &hall::html(sweep, log.zeros.get(at));
+        }
+    }
+    html + &uncertainty::of_last(logs.iter().flat_map(|it| &it.zeros))
 }
 
 #[cfg(test)]

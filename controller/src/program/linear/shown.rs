@@ -5,6 +5,8 @@ use units::Metres;
 
 use crate::linear::LinearContent;
 use crate::linear::record::NodeRecord;
+use crate::program::page::chart::{BLUE, ORANGE};
+use crate::program::page::compare::{Pair, overlaid};
 use crate::program::show::{Changes, Show};
 use crate::program::text;
 
@@ -51,6 +53,28 @@ impl Show for LinearContent {
         }
         Some((lines, values))
     }
+
+    fn drawn(&self, after: &Self) -> String {
+        let pair = |names, colour, side: fn(&NodeRecord) -> Option<f64>| Pair {
+            names,
+            colour,
+            before: curve(self, side),
+            after: curve(after, side),
+        };
+        let pairs = [
+            pair(["before ↑", "after ↑", "↑"], BLUE, |it| it.forward_m),
+            pair(["before ↓", "after ↓", "↓"], ORANGE, |it| {
+                it.reverse_m
+            }),
+        ];
+        overlaid("Error tables", ("position (mm)", "deviation (µm)"), &pairs)
+    }
+}
+
+fn curve(content: &LinearContent, side: fn(&NodeRecord) -> Option<f64>) -> Vec<(f64, f64)> {
+    let nodes = content.nodes.iter();
+    let each = nodes.filter_map(|it| Some((Metres(it.position_m).mm(), Metres(side(it)?).um())));
+    each.collect()
 }
 
 fn micrometres(metres: Option<f64>) -> String {

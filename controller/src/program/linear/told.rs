@@ -1,9 +1,11 @@
 //! The results of linear axes as they are printed: text for people, one object for programs.
 
 use serde_json::{Value, json};
-use units::Short;
+use units::{Metres, Short};
 
-use crate::linear::{Calibrated, LinearTeller, Moved, Verified, ZeroEntry, Zeroed};
+use crate::linear::{
+    Calibrated, HallSweepEntry, HeldEntry, LinearTeller, Moved, Verified, ZeroEntry, Zeroed,
+};
 use crate::program::linear::{moved as of_move, uncertainty};
 use crate::program::{json as to_json, text};
 use crate::runs::Told;
@@ -56,6 +58,7 @@ pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
         "zero": to_json::zero(estimate),
         "uncertainty": uncertainty::value_of_zero(&zeroed.entry),
         "flat_level": zeroed.flat.map(|it| json!({"steepness": it.steepness, "linearity": it.linearity})),
+        "search": search(&HallSweepEntry::of(&zeroed.outcome)),
         "drift_since_last": drift.map(|(peak, mid)| json!({"peak_mv": peak, "slope_mv": mid})),
         "journal": zeroed.journal,
     });
@@ -68,6 +71,23 @@ pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {
 fn budget_of_zero(entry: &ZeroEntry) -> String {
     let worst = uncertainty::of_zero(entry);
     worst.map_or_else(String::new, |it| format!("\n{}", it.sentence()))
+}
+
+/// Where the steps of a search ended, in the drive's coordinates before the origin became zero.
+fn search(it: &HallSweepEntry) -> Value {
+    let held = |it: HeldEntry| {
+        json!({
+            "position_um": to_json::um(Metres(it.position_m)),
+            "peak_v": it.peak_v,
+            "slope_v": it.slope_v,
+        })
+    };
+    json!({
+        "g7": {"position_um": to_json::um(Metres(it.peak_m)), "peak_v": it.peak_max_v},
+        "g1_p1": held(it.g1),
+        "g2_p2": held(it.g2),
+        "g8_p0": held(it.p0),
+    })
 }
 
 pub(crate) fn calibrated(calibrated: &Calibrated) -> Told {

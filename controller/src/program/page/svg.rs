@@ -2,29 +2,81 @@
 
 use core::fmt::Write as _;
 
+use super::escape;
+
 pub(crate) const WIDTH: f64 = 960.0;
 pub(crate) const HEIGHT: f64 = 320.0;
 pub(crate) const LEFT: f64 = 64.0;
 pub(crate) const RIGHT: f64 = 20.0;
 pub(crate) const TOP: f64 = 24.0;
 pub(crate) const BOTTOM: f64 = 44.0;
-pub(crate) const FORWARD: &str = "var(--first)";
-pub(crate) const REVERSE: &str = "var(--second)";
+
+/// A picture's size, and what of it is left around the plot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) top: f64,
+    pub(crate) bottom: f64,
+}
+
+impl Frame {
+    /// That of most plots.
+    pub(crate) const USUAL: Self = Self {
+        width: WIDTH,
+        height: HEIGHT,
+        left: LEFT,
+        right: RIGHT,
+        top: TOP,
+        bottom: BOTTOM,
+    };
+}
 
 /// From data to the page.
 pub(crate) struct Axes {
     pub(crate) x: (f64, f64),
     pub(crate) y: (f64, f64),
+    pub(crate) frame: Frame,
 }
 
 impl Axes {
+    pub(crate) const fn new(x: (f64, f64), y: (f64, f64)) -> Self {
+        let frame = Frame::USUAL;
+        Self { x, y, frame }
+    }
+
     pub(crate) fn px(&self, x: f64) -> f64 {
-        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+        let Frame {
+            width, left, right, ..
+        } = self.frame;
+        left + (x - self.x.0) / (self.x.1 - self.x.0) * (width - left - right)
     }
 
     pub(crate) fn py(&self, y: f64) -> f64 {
-        HEIGHT - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (HEIGHT - TOP - BOTTOM)
+        let Frame {
+            height,
+            top,
+            bottom,
+            ..
+        } = self.frame;
+        height - bottom - (y - self.y.0) / (self.y.1 - self.y.0) * (height - top - bottom)
     }
+
+    /// Where the points are on the page, as a list of places.
+    pub(crate) fn places(&self, points: &[(f64, f64)]) -> String {
+        points.iter().fold(String::new(), |mut text, (x, y)| {
+            let _ = write!(text, "{:.1},{:.1} ", self.px(*x), self.py(*y));
+            text
+        })
+    }
+}
+
+/// The beginning of a picture that is called `title`.
+pub(crate) fn opened(title: &str, (width, height): (f64, f64)) -> String {
+    let title = escape(title);
+    format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\"><title>{title}</title>")
 }
 
 /// The range of `values`, widened on both sides by `share` of it, and never empty.
@@ -75,7 +127,13 @@ pub(crate) fn label(value: f64, step: f64) -> String {
 /// Lines, numbers, and what both axes are.
 pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
     let mut svg = String::from("<g font-size=\"12\" fill=\"var(--quiet)\" stroke-width=\"1\">");
-    let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+    let Frame {
+        width,
+        height,
+        left,
+        ..
+    } = axes.frame;
+    let (right, bottom) = (width - axes.frame.right, height - axes.frame.bottom);
     let y_step = step(axes.y.1 - axes.y.0, 6.0);
     for y in ticks(axes.y, 6.0) {
         let py = axes.py(y);
@@ -86,9 +144,9 @@ pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
         };
         let _ = write!(
             svg,
-            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>"
+            "<line x1=\"{left}\" x2=\"{right}\" y1=\"{py:.1}\" y2=\"{py:.1}\" stroke=\"{colour}\"/>"
         );
-        let (x, y_text, text) = (LEFT - 8.0, py + 4.0, label(y, y_step));
+        let (x, y_text, text) = (left - 8.0, py + 4.0, label(y, y_step));
         let _ = write!(
             svg,
             "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>"
@@ -102,12 +160,12 @@ pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
             "<text x=\"{px:.1}\" y=\"{y}\" text-anchor=\"middle\">{text}</text>"
         );
     }
-    let (middle, base) = ((LEFT + right) / 2.0, HEIGHT - 6.0);
+    let (middle, base) = ((left + right) / 2.0, height - 6.0);
     let _ = write!(
         svg,
         "<text x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">{x_label}</text>"
     );
-    let _ = write!(svg, "<text x=\"{LEFT}\" y=\"14\">{y_label}</text></g>");
+    let _ = write!(svg, "<text x=\"{left}\" y=\"14\">{y_label}</text></g>");
     svg
 }
 

@@ -144,7 +144,7 @@ fn write_report(store: &Store, story: &Story) -> Result<PathBuf, Failure> {
     let calibrations = made_from(&story.calibrated.journal)?;
     let page = PlatformPage {
         title: format!("truestage: platform {}", left.header.machine),
-        facts: page::facts_of(&left),
+        facts: page::head(&left, &[]),
         visits: vec![
             ("as found".into(), &found),
             ("as left".into(), &left),

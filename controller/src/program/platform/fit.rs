@@ -9,7 +9,7 @@ use compensator::screw::{
 use compensator::screw::{AxisStrokes, ScatterParts, Stroke, StrokeSeries};
 use machine::records::{CalibrationRecord, short};
 use serde_json::{Value, json};
-use units::{Metres, Short};
+use units::{Approach, Metres, Short};
 
 use crate::platform::PlatformConfig;
 use crate::platform::PlatformFailure;
@@ -18,6 +18,9 @@ use crate::program::budget;
 use crate::program::data_file::head_of;
 use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
+use crate::program::page::chart::{BLUE, ORANGE};
+use crate::program::page::compare::{Pair, overlaid};
+use crate::program::platform::report::curve;
 use crate::program::platform::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
 use crate::program::text;
@@ -305,6 +308,24 @@ impl Show for ScrewContent {
 
     fn changes(&self, after: &Self) -> Option<Changes> {
         Some(changes(self, after))
+    }
+
+    fn drawn(&self, after: &Self) -> String {
+        let pair = |names, colour, approach| Pair {
+            names,
+            colour,
+            before: curve(&self.model(), approach),
+            after: curve(&after.model(), approach),
+        };
+        let pairs = [
+            pair(["before ↑", "after ↑", "↑"], BLUE, Approach::Forward),
+            pair(["before ↓", "after ↓", "↓"], ORANGE, Approach::Reverse),
+        ];
+        overlaid(
+            "Models of the screw",
+            ("stroke (mm)", "deviation (µm)"),
+            &pairs,
+        )
     }
 }
 

@@ -1,5 +1,6 @@
 //! Alignment platforms on the command line.
 
+mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
@@ -44,6 +45,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     shown: &[Shown::of::<ScrewContent>()],
     opened_by: PlatformLog::OPENED_BY,
     page: html,
+    compare: compare::compared,
 };
 
 /// The page of the journal at `path`, with what was made from it.

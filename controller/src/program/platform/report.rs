@@ -1,6 +1,8 @@
 //! Pages of an alignment platform: the error of each pose, the deviations of each screw, and where
 //! the zero is.
 
+mod head;
+
 use core::fmt::Write as _;
 
 use compensator::platform::Pose;
@@ -14,10 +16,14 @@ use crate::platform::state::difference;
 use crate::platform::verify::{PoseChecked, PoseFigures};
 use crate::platform::{ArrangementEntry, PoseEntry, ScrewContent, StrokeEntry};
 use crate::program::budget;
-use crate::program::page::chart::{Arrow, BLUE, GREEN, Mark, ORANGE, Series, chart, map};
-use crate::program::page::{IN_USE, document, escape, facts};
+use crate::program::page::chart::{BLUE, GREEN, Mark, ORANGE, Series, chart};
+use crate::program::page::head::{Fact, facts};
+use crate::program::page::map::{Arrow, Map, longest, map};
+use crate::program::page::{document, escape};
 use crate::program::platform::uncertainty;
 use crate::program::text;
+
+pub(crate) use self::head::head;
 
 /// How finely a model's curve is drawn.
 const CURVE_POINTS: u32 = 240;
@@ -30,8 +36,8 @@ pub(crate) type Named = (String, CalibrationRecord<ScrewContent>);
 pub(crate) struct PlatformPage<'a> {
     /// Heading.
     pub(crate) title: String,
-    /// Name and value, for the head of the page.
-    pub(crate) facts: Vec<(String, String)>,
+    /// The head of the page.
+    pub(crate) facts: Vec<Fact>,
     /// Verifications: a heading (`as found`, `as left` …) and the run.
     pub(crate) visits: Vec<(String, &'a ReadJournal<PlatformLog>)>,
     /// The run that calibrated, with the calibrations made from it by their names.
@@ -46,7 +52,7 @@ impl<'a> PlatformPage<'a> {
         let header = &journal.header;
         let mut page = Self {
             title: format!("{} of platform {}", header.verb, header.machine),
-            facts: facts_of(journal),
+            facts: head::head(journal, &calibrations),
             ..Self::default()
         };
         let visited = journal.log.poses.iter().any(|it| it.target.is_some());
@@ -64,29 +70,6 @@ impl<'a> PlatformPage<'a> {
     }
 }
 
-/// The head of a page of one run, with the calibrations' names as short as elsewhere.
-pub(crate) fn facts_of(journal: &ReadJournal<PlatformLog>) -> Vec<(String, String)> {
-    let mut facts = crate::program::page::facts_of(
-        journal,
-        journal.log.strokes.len() + journal.log.poses.len(),
-    );
-    let named = facts.iter_mut().filter(|(name, _)| name == IN_USE);
-    for (_, value) in named {
-        let each = value.split(' ').map(|it| match it.split_once('=') {
-            Some((axis, id)) => format!("{axis} {}", short(id)),
-            None => it.to_owned(),
-        });
-        *value = each.collect::<Vec<_>>().join(", ");
-    }
-    // What is corrected for air or material is an interferometer.
-    let seen_by = facts.iter_mut().filter(|(name, _)| name == "instrument");
-    for (_, value) in seen_by {
-        let end = value.rfind(", corrected for").unwrap_or(value.len());
-        value.truncate(end);
-    }
-    facts
-}
-
 /// The page as HTML.
 pub(crate) fn render(page: &PlatformPage<'_>) -> String {
     let mut html = facts(&page.facts);
@@ -94,6 +77,9 @@ pub(crate) fn render(page: &PlatformPage<'_>) -> String {
     if !visits.is_empty() {
         html += "<h2>Errors of poses, open loop</h2>";
         html += &visit_figures(&visits);
+    }
+    if visits.len() > 1 {
+        html += &maps_at_one_scale(&visits);
     }
     for visit in &visits {
         html += &visit_section(visit);
@@ -105,13 +91,12 @@ pub(crate) fn render(page: &PlatformPage<'_>) -> String {
         html += "<h2>Zero</h2>";
         html += &zeros(&page.zeros);
     }
-    let note = "error = seen − target; deviation = stroke seen − stroke commanded. Poses are \
-                counted from where all screws stand at their zero, reached forward.";
+    let note = "Poses are counted from where all screws stand at their zero, reached forward.";
     document(&page.title, &html, note)
 }
 
 /// A verification, computed.
-struct Visit<'a> {
+pub(crate) struct Visit<'a> {
     title: &'a str,
     poses: Vec<PoseChecked>,
     figures: PoseFigures,
@@ -136,6 +121,63 @@ impl<'a> Visit<'a> {
             tolerance: arrangement.and_then(|it| it.tolerance_m).map(Metres),
         }
     }
+}
+
+/// A verification under its name.
+pub(crate) fn visit<'a>(it: &'a (String, &'a ReadJournal<PlatformLog>)) -> Visit<'a> {
+    Visit::of(it)
+}
+
+/// A figure of a verification that is compared with that of another.
+pub(crate) struct PoseRow {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    /// `None` where no pose was visited.
+    pub(crate) value: fn(&Visit<'_>) -> Option<f64>,
+}
+
+pub(crate) const COMPARED: [PoseRow; 3] = [
+    PoseRow {
+        name: "largest error of a pose",
+        unit: "µm",
+        value: |it| (!it.poses.is_empty()).then(|| it.figures.largest.um()),
+    },
+    PoseRow {
+        name: "rms error of the poses",
+        unit: "µm",
+        value: |it| (!it.poses.is_empty()).then(|| it.figures.rms.um()),
+    },
+    PoseRow {
+        name: "largest skew of the starts",
+        unit: "ms",
+        value: |it| Some(it.figures.skew_max_s? * 1e3),
+    },
+];
+
+/// The errors in the plane of each verification, all at one scale.
+pub(crate) fn maps_at_one_scale(visits: &[Visit<'_>]) -> String {
+    let drawn: Vec<_> = visits.iter().map(|it| (it, arrows(it))).collect();
+    if drawn.iter().all(|(_, it)| it.is_empty()) {
+        return String::new();
+    }
+    let most = drawn.iter().map(|(_, it)| longest(it)).fold(0.0, f64::max);
+    let maps = drawn.iter().map(|(visit, arrows)| {
+        let svg = map_of(visit.title, arrows, most);
+        let title = escape(visit.title);
+        format!("<figure><figcaption>{title}</figcaption>{svg}</figure>")
+    });
+    let maps: String = maps.collect();
+    format!("<h2>Errors over the work range at one scale</h2>{maps}")
+}
+
+fn map_of(title: &str, arrows: &[Arrow], longest: f64) -> String {
+    map(&Map {
+        title: &format!("Errors over the work range {title}"),
+        labels: ("x (mm)", "y (mm)"),
+        unit: "µm",
+        arrows,
+        longest,
+    })
 }
 
 fn error_of(it: &PoseChecked) -> Pose {
@@ -183,6 +225,15 @@ fn visit_figures(visits: &[Visit<'_>]) -> String {
     html + "</table>"
 }
 
+/// The errors in the plane of a verification.
+fn arrows(visit: &Visit<'_>) -> Vec<Arrow> {
+    let each = visit.poses.iter().map(|it| Arrow {
+        at: (it.target.x.mm(), it.target.y.mm()),
+        shows: (error_of(it).x.um(), error_of(it).y.um()),
+    });
+    each.collect()
+}
+
 fn visit_section(visit: &Visit<'_>) -> String {
     let title = escape(visit.title);
     let numbered = |of: &dyn Fn(&PoseChecked) -> Metres| {
@@ -191,12 +242,7 @@ fn visit_section(visit: &Visit<'_>) -> String {
             .map(|(at, it)| ((at + 1) as f64, of(it).um()))
             .collect()
     };
-    let series = |name, colour, points| Series {
-        name,
-        colour,
-        mark: Mark::Dots,
-        points,
-    };
+    let series = |name, colour, points| Series::new(name, colour, Mark::Dots, points);
     let all = [
         series("x", BLUE, numbered(&|it| error_of(it).x)),
         series("y", ORANGE, numbered(&|it| error_of(it).y)),
@@ -213,20 +259,8 @@ fn visit_section(visit: &Visit<'_>) -> String {
         &all,
         limit,
     );
-    let arrows: Vec<Arrow> = visit
-        .poses
-        .iter()
-        .map(|it| Arrow {
-            at: (it.target.x.mm(), it.target.y.mm()),
-            shows: (error_of(it).x.um(), error_of(it).y.um()),
-        })
-        .collect();
-    let place = map(
-        &format!("Errors over the work range {}", visit.title),
-        "mm",
-        "µm",
-        &arrows,
-    );
+    let arrows = arrows(visit);
+    let place = map_of(visit.title, &arrows, longest(&arrows));
     format!(
         "<h2>Error of each pose {title}</h2><figure>{errors}</figure>\
          <h2>Errors over the work range {title}</h2><figure>{place}</figure>\
@@ -359,7 +393,8 @@ fn deviations(axis: &str, strokes: &[&StrokeEntry], model: Option<&ScrewModel>) 
     chart(&title, ("stroke (mm)", "deviation (µm)"), &series, None)
 }
 
-fn curve(model: &ScrewModel, approach: Approach) -> Vec<(f64, f64)> {
+/// Of each stroke, in millimetres, the deviation that the model says, in micrometres.
+pub(crate) fn curve(model: &ScrewModel, approach: Approach) -> Vec<(f64, f64)> {
     let point = |at: u32| {
         let share = f64::from(at) / f64::from(CURVE_POINTS);
         let stroke = model.first + (model.last - model.first) * share;

@@ -17,6 +17,8 @@ use crate::program::budget;
 use crate::program::data_file::rotary_head_of;
 use crate::program::data_text::{name_of, read};
 use crate::program::output::{Ended, Output};
+use crate::program::page::chart::BLUE;
+use crate::program::page::compare::{Pair, overlaid};
 use crate::program::rotary::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
 use crate::rotary::RotaryContent;
@@ -282,6 +284,25 @@ impl Show for RotaryContent {
     fn changes(&self, after: &Self) -> Option<Changes> {
         Some(changes(self, after))
     }
+
+    fn drawn(&self, after: &Self) -> String {
+        let pair = Pair {
+            names: ["before", "after", "change"],
+            colour: BLUE,
+            before: curve(self),
+            after: curve(after),
+        };
+        let labels = ("table angle (°)", "reading − true angle (″)");
+        overlaid("Table errors", labels, &[pair])
+    }
+}
+
+/// The table error by degrees, arcseconds.
+fn curve(content: &RotaryContent) -> Vec<(f64, f64)> {
+    let lines = content.table_error_rad.len().max(1) as f64;
+    let each = content.table_error_rad.iter().enumerate();
+    each.map(|(line, it)| (360.0 * line as f64 / lines, Radians(*it).arcsec()))
+        .collect()
 }
 
 /// A stored table, for `cal show`.

@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 use units::Radians;
 
 use crate::program::json::rounded;
+use crate::rotary::RotaryContent;
+use crate::rotary::bidirectional::Bidirectional;
 
 /// Arcseconds, rounded to a thousandth of a microarcsecond.
 pub(crate) fn arcsec(angle: Radians) -> f64 {
@@ -91,5 +93,30 @@ fn reading(reading: &Reading) -> Value {
         "placement": reading.placement,
         "offset": reading.offset,
         "line": reading.line,
+    })
+}
+
+/// The harmonics of a table error, up to the highest that its lines tell between them, too.
+pub(crate) fn harmonics(content: &RotaryContent) -> Value {
+    let each = content.harmonics().into_iter().map(|it| {
+        json!({
+            "number": it.number,
+            "amplitude_arcsec": arcsec(it.amplitude),
+            "standard_uncertainty_arcsec": it.standard_uncertainty.map(arcsec),
+            "phase_deg": it.phase.degrees(),
+            "significant": it.is_significant,
+        })
+    });
+    each.collect()
+}
+
+/// What the directions of a placement's passes differ by. A reversal value is forward − reverse.
+pub(crate) fn bidirectional(it: &Bidirectional) -> Value {
+    let [forward, reverse] = it.repeatability.map(|it| it.map(arcsec));
+    json!({
+        "reversal_arcsec": it.reversal.iter().map(|it| it.map(arcsec)).collect::<Vec<_>>(),
+        "mean_reversal_arcsec": arcsec(it.mean_reversal),
+        "reversal_variation_arcsec": arcsec(it.reversal_variation),
+        "repeatability_arcsec": {"forward": forward, "reverse": reverse},
     })
 }

@@ -1,6 +1,7 @@
 //! Rotary tables on the command line.
 
 mod asked;
+mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
@@ -51,6 +52,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     shown: &[Shown::of::<RotaryContent>()],
     opened_by: PlateLog::OPENED_BY,
     page: html,
+    compare: compare::compared,
 };
 
 /// What a person who reads the plate has before him.

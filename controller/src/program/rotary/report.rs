@@ -1,6 +1,10 @@
 //! The page of a rotary table's run: what was read of the plate, what it says of table and plate,
 //! and the table as found and as left.
 
+mod bidirectional;
+mod harmonics;
+mod head;
+
 use core::fmt::Write as _;
 
 use machine::records::{CalibrationRecord, ReadJournal};
@@ -9,13 +13,17 @@ use units::Radians;
 use crate::program::budget;
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
-use crate::program::page::{document, escape, facts, facts_of};
+use crate::program::page::head::facts;
+use crate::program::page::polar::polar;
+use crate::program::page::{document, escape};
 use crate::program::rotary::residuals::residuals_of;
 use crate::program::rotary::uncertainty;
 use crate::rotary::PlateLog;
 use crate::rotary::placed::largest_closure;
 use crate::rotary::verify::RotaryFigures;
-use crate::rotary::{JudgedEntry, RotaryContent, SightedAt};
+use crate::rotary::{JudgedEntry, RotaryContent};
+
+pub(crate) use self::head::head;
 
 /// So many readings that were left out are named.
 const NAMED: usize = 20;
@@ -35,7 +43,7 @@ pub(crate) fn render_with(
     later: &[(&str, &ReadJournal<PlateLog>)],
 ) -> String {
     let header = &journal.header;
-    let mut html = facts(&facts_of_run(journal, calibrations));
+    let mut html = facts(&head(journal, calibrations));
     html += &placements(journal);
     for (_, record) in calibrations {
         html += &calibration(&record.content);
@@ -54,45 +62,9 @@ pub(crate) fn render_with(
             html += &verification(name, judged, journal);
         }
     }
-    let note = "deviation = actual − target, table error = reading − true angle: one is the negative \
-                of the other. Angles are those of the table.";
+    let note = "Angles are those of the table.";
     let title = format!("{} of rotary axis {}", header.verb, header.axis);
     document(&title, &html, note)
-}
-
-fn facts_of_run(
-    journal: &ReadJournal<PlateLog>,
-    calibrations: &[(String, CalibrationRecord<RotaryContent>)],
-) -> Vec<(String, String)> {
-    let mut facts = facts_of(journal, 0);
-    // Readings of a plate are no points.
-    facts.retain(|(name, _)| name != "points" && name != "instrument");
-    let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
-    if let Some(plan) = &journal.log.plan {
-        let offsets: Vec<_> = plan.offsets.iter().map(f64::to_string).collect();
-        add("plate", format!("{}, {} lines", plan.plate, plan.lines));
-        add("placements", format!("at {} lines", offsets.join(", ")));
-        add(
-            "read",
-            format!(
-                "{} pass(es) in each direction{}, the first repeated at the end",
-                plan.passes,
-                match plan.sighted {
-                    None => format!(" at {:.3} °/s", plan.speed_rad_per_s.to_degrees()),
-                    Some(SightedAt::Position) => {
-                        ", by a person, with the table at each line's nominal angle".to_owned()
-                    }
-                    Some(SightedAt::Line) => {
-                        ", by a person, with each line under the cross-hair".to_owned()
-                    }
-                },
-            ),
-        );
-    }
-    for (id, _) in calibrations {
-        add("calibration made", id.clone());
-    }
-    facts
 }
 
 fn arcsec(radians: f64) -> f64 {
@@ -147,38 +119,27 @@ fn points<'a>(values: impl Iterator<Item = Option<f64>> + 'a, lines: u32) -> Vec
         .collect()
 }
 
-const fn series(
-    name: &'static str,
-    colour: &'static str,
-    mark: Mark,
-    points: Vec<(f64, f64)>,
-) -> Series {
-    Series {
-        name,
-        colour,
-        mark,
-        points,
-    }
-}
-
 fn calibration(content: &RotaryContent) -> String {
     let lines = content.lines;
     let table = || content.table_error_rad.iter().copied();
     let curve = points(table().map(Some), lines);
-    let sure = content.standard_uncertainty_rad.iter().flatten();
-    let sure = curve.iter().zip(sure);
-    let sure = sure.map(|((x, y), u)| (*x, *y, arcsec(*u)));
+    let known = content.standard_uncertainty_rad.as_ref();
+    let u_at = |line: usize| known.map_or(0.0, |it| arcsec(it[line]));
+    let sure = curve.iter().enumerate();
+    let sure = sure.map(|(line, (x, y))| (*x, *y, u_at(line)));
     let sure: Vec<Sure> = sure.collect();
     let factor = enlargement([sure.as_slice()].into_iter());
-    let mut table_series = vec![series("table error", BLUE, Mark::Line, curve)];
+    let mut table_series = vec![Series::new("table error", BLUE, Mark::Line, curve)];
     let mut shaded = String::new();
-    if !sure.is_empty() {
+    if known.is_some() {
         // Beneath the curve.
         table_series.insert(0, band("2 u", ORANGE, &sure, factor));
         shaded = said(factor);
     }
     let plate = points(content.plate_error_rad.iter().copied(), lines);
-    let plate = [series("plate error", BLUE, Mark::Dots, plate)];
+    let round = polar("Table error over a turn", "″", &sure, factor);
+    let harmonics = harmonics::html(content);
+    let plate = [Series::new("plate error", BLUE, Mark::Dots, plate)];
     let u = content.uncertainty_max();
     let u = u.map_or("unknown".to_owned(), |u| {
         format!("{:.4} ″ at most", u.arcsec())
@@ -186,7 +147,7 @@ fn calibration(content: &RotaryContent) -> String {
     let mut html = format!(
         "<h2>Table error</h2><p>Up to {:.3} ″ at the lines; standard uncertainty {u}; residuals {:.4} ″ rms with {} \
          degrees of freedom; noise of a reading amplified {:.3} times. The table error {}.</p><figure>{}</figure>{shaded}\
-         <h2>Plate error</h2><p>Up to {:.3} ″.</p><figure>{}</figure>",
+         <figure>{round}</figure>{harmonics}<h2>Plate error</h2><p>Up to {:.3} ″.</p><figure>{}</figure>",
         content.largest_error().arcsec(),
         arcsec(content.residual_rms_rad),
         content.degrees_of_freedom,
@@ -251,7 +212,12 @@ fn residuals(each: &[(Radians, Radians)]) -> String {
     let points = each
         .iter()
         .map(|(at, residual)| (at.degrees(), residual.arcsec()));
-    let dots = [series("one reading", BLUE, Mark::Dots, points.collect())];
+    let dots = [Series::new(
+        "one reading",
+        BLUE,
+        Mark::Dots,
+        points.collect(),
+    )];
     format!(
         "<h2>Residuals</h2><p>What the fit leaves of each reading, all placements \
          together.</p><figure>{}</figure>",
@@ -264,10 +230,27 @@ fn residuals(each: &[(Radians, Radians)]) -> String {
     )
 }
 
-fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog>) -> String {
+/// Deviations by line, as degrees of the table and arcseconds.
+pub(crate) fn places(journal: &ReadJournal<PlateLog>, values: &[Option<f64>]) -> Vec<(f64, f64)> {
+    let offset = offset_of(journal);
+    let lines = values.len().max(1) as f64;
+    let place = |line: usize| ((line as f64 + offset) % lines) * 360.0 / lines;
+    let each = values.iter().enumerate();
+    let mut points: Vec<_> = each
+        .filter_map(|(line, value)| Some((place(line), arcsec((*value)?))))
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points
+}
+
+/// By how many lines the plate of a verification was turned.
+fn offset_of(journal: &ReadJournal<PlateLog>) -> f64 {
     let plan = journal.log.plan.as_ref();
     let offset = plan.and_then(|it| it.offsets.first()).copied();
-    let offset = offset.unwrap_or(0.0);
+    offset.unwrap_or(0.0)
+}
+
+fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog>) -> String {
     let mut html = format!("<h2>As found and as left{}</h2>", escape(name));
     if !judged.plate_known {
         html += "<p>No calibration contains this plate: its errors are part of these \
@@ -291,17 +274,12 @@ fn verification(name: &str, judged: &JudgedEntry, journal: &ReadJournal<PlateLog
         "</table><p>tolerance {:.3} ″ as left</p>",
         arcsec(judged.tolerance_rad)
     );
+    html += &bidirectional::html(journal, offset_of(journal));
     for (name, values) in both {
         let Some(values) = values else { continue };
-        let lines = values.len().max(1) as f64;
-        let place = |line: usize| ((line as f64 + offset) % lines) * 360.0 / lines;
-        let each = values.iter().enumerate();
-        let mut points: Vec<_> = each
-            .filter_map(|(line, value)| Some((place(line), arcsec((*value)?))))
-            .collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let points = places(journal, values);
         let limit = (name == "as left").then(|| arcsec(judged.tolerance_rad));
-        let dots = [series("deviation", BLUE, Mark::Dots, points)];
+        let dots = [Series::new("deviation", BLUE, Mark::Dots, points)];
         let labels = ("table angle (°)", "deviation (″)");
         let _ = write!(
             html,

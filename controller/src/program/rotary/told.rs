@@ -4,7 +4,7 @@ use machine::records::short;
 use serde_json::{Value, json};
 
 use crate::program::output::{Ended, Output};
-use crate::program::rotary::json::{arcsec, solution};
+use crate::program::rotary::json::{arcsec, bidirectional, harmonics, solution};
 use crate::program::rotary::uncertainty;
 use crate::program::text::verdict;
 use crate::rotary::verify::RotaryFigures;
@@ -117,6 +117,7 @@ pub(crate) fn calibrated_value(calibrated: &RotaryCalibrated) -> Value {
     value["closure_arcsec"] = json!(arcsec(calibrated.closure));
     value["pass_scatter_arcsec"] = json!(calibrated.scatter.map(arcsec));
     value["uncertainty"] = uncertainty::value(&calibrated.content);
+    value["harmonics"] = harmonics(&calibrated.content);
     value["largest_deviation_arcsec"] = json!(arcsec(calibrated.content.largest_error()));
     value
 }
@@ -179,6 +180,7 @@ pub(crate) fn verified_value(verified: &RotaryVerified) -> Value {
         "as_found": figures_value(&verified.found),
         "as_left": verified.left.as_ref().map(figures_value),
         "reading_noise_arcsec": verified.noise.map(arcsec),
+        "bidirectional": verified.bidirectional.as_ref().map(bidirectional),
         "closure_arcsec": arcsec(verified.closure),
         "tolerance_arcsec": arcsec(verified.tolerance),
         "within_tolerance": verified.left.is_some().then(|| verified.is_within_tolerance()),

@@ -1,6 +1,7 @@
 //! Three axes that are corrected throughout their volume, on the command line.
 
 mod asked;
+mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
@@ -53,6 +54,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     ],
     opened_by: VolumeLog::OPENED_BY,
     page: html,
+    compare: compare::compared,
 };
 
 /// The page of the journal at `path`, with what was made from it.

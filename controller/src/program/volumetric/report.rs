@@ -2,6 +2,8 @@
 //! warm the machine was, and what verifications showed over the hours.
 
 mod agreement;
+mod head;
+mod volume;
 
 use core::fmt::Write as _;
 
@@ -12,13 +14,16 @@ use units::{Metres, Radians};
 use crate::program::budget;
 use crate::program::page::band::{Sure, band, enlargement, said};
 use crate::program::page::chart::{BLUE, COLOURS, GREEN, Mark, ORANGE, Series, chart};
-use crate::program::page::{document, escape, facts};
+use crate::program::page::head::facts;
+use crate::program::page::{document, escape};
 use crate::program::text::verdict;
 use crate::program::volumetric::{shown, uncertainty};
 use crate::volumetric::verify::from_the_first;
 use crate::volumetric::{
     FunctionRecord, GeometryContent, LineEntry, LineReadingEntry, OpticsName, VolumeLog,
 };
+
+pub(crate) use self::head::head;
 
 /// Parts between two nodes in which a curve is drawn.
 const PARTS: usize = 8;
@@ -68,7 +73,7 @@ impl Made {
 pub(crate) fn render(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
     let header = &journal.header;
     let title = format!("{} of three axes, {}", header.verb, header.machine);
-    let mut html = facts(&facts_of_run(journal, made));
+    let mut html = facts(&head(journal, made));
     if journal.log.check.is_some() {
         html += &verification(journal);
         html += &temperatures(&journal.log.readings);
@@ -85,36 +90,14 @@ pub(crate) fn render_day(
     made: &Made,
 ) -> String {
     let title = format!("A day of three axes, {}", calibrated.header.machine);
-    let mut html = facts(&facts_of_run(calibrated, made));
+    let mut html = facts(&head(calibrated, made));
     html += &curves(day);
     html += &calibration(calibrated, made);
     document(&title, &html, NOTE)
 }
 
-const NOTE: &str = "deviation = actual − target, at the tool; tilts are right-handed. E of an axis \
-                    and a direction: e_yx is the displacement of x along y, e_ax its tilt about x.";
-
-fn facts_of_run(journal: &ReadJournal<VolumeLog>, made: &Made) -> Vec<(String, String)> {
-    let mut facts = crate::program::page::facts_of(journal, 0);
-    // Readings of lines are no points, and three axes no axis.
-    facts.retain(|(name, _)| name != "points" && name != "axis" && name != "drive");
-    // Who the instrument is shows when it is switched on, after the journal was begun.
-    for (_, value) in facts.iter_mut().filter(|(name, _)| name == "instrument") {
-        *value = value.replacen(" ()", "", 1);
-    }
-    let mut add = |name: &str, value: String| facts.push((name.to_owned(), value));
-    let read = &journal.log;
-    if let Some(plan) = &read.plan {
-        let (whole, all) = (read.whole.len(), plan.lines.len());
-        add("lines", format!("{whole} of {all} read whole"));
-        add("chain", plan.chain.clone());
-    }
-    add("readings", read.readings.len().to_string());
-    for (id, kind) in &made.named {
-        add(&format!("made: {kind}"), id.clone());
-    }
-    facts
-}
+const NOTE: &str =
+    "E of an axis and a direction: e_yx is the displacement of x along y, e_ax its tilt about x.";
 
 fn um(metres: f64) -> f64 {
     Metres(metres).um()
@@ -167,15 +150,10 @@ fn curves(day: &[HourOfDay<'_>]) -> String {
     html + &temperatures(&readings)
 }
 
-const ALONG: (&str, &str) = ("distance along the line (mm)", "deviation (µm)");
+pub(crate) const ALONG: (&str, &str) = ("distance along the line (mm)", "deviation (µm)");
 
-fn line(name: &'static str, colour: &'static str, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        name,
-        colour,
-        mark: Mark::Line,
-        points,
-    }
+const fn line(name: &'static str, colour: &'static str, points: Vec<(f64, f64)>) -> Series {
+    Series::new(name, colour, Mark::Line, points)
 }
 
 fn way(reading: &LineReadingEntry, from: [f64; 3]) -> f64 {
@@ -184,7 +162,7 @@ fn way(reading: &LineReadingEntry, from: [f64; 3]) -> f64 {
 }
 
 /// Of each reading its way in millimetres and its deviation in micrometres, from what these were at the beginning.
-fn deviations(journal: &ReadJournal<VolumeLog>) -> Vec<(f64, f64)> {
+pub(crate) fn deviations(journal: &ReadJournal<VolumeLog>) -> Vec<(f64, f64)> {
     let readings = &journal.log.readings;
     let from = readings.first().map_or([0.0; 3], |it| it.at_m);
     let (deviations, _) = read_along(journal);
@@ -193,7 +171,7 @@ fn deviations(journal: &ReadJournal<VolumeLog>) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn read_along(journal: &ReadJournal<VolumeLog>) -> (Vec<Metres>, Metres) {
+pub(crate) fn read_along(journal: &ReadJournal<VolumeLog>) -> (Vec<Metres>, Metres) {
     let readings = journal.log.readings.iter();
     let read: Vec<Metres> = readings.map(|it| Metres(it.deviation_si)).collect();
     from_the_first(&read)
@@ -287,6 +265,9 @@ fn temperatures(readings: &[LineReadingEntry]) -> String {
 fn calibration(journal: &ReadJournal<VolumeLog>, made: &Made) -> String {
     let mut html: String = made.geometries.iter().map(geometry).collect();
     let read = &journal.log;
+    if let (Some(content), Some(plan)) = (made.geometries.first(), &read.plan) {
+        html += &volume::html(content, plan);
+    }
     html += &agreement::residuals(read, made.geometries.first());
     html += &temperatures(&read.readings);
     html + &lines(read)

@@ -1,5 +1,6 @@
 //! The stored errors of three axes on the screen.
 
+mod difference;
 mod references;
 
 use serde_json::json;
@@ -21,6 +22,10 @@ impl Show for GeometryContent {
 
     fn changes(&self, after: &Self) -> Option<Changes> {
         Some(changes(self, after))
+    }
+
+    fn drawn(&self, after: &Self) -> String {
+        difference::drawn(self, after)
     }
 }
 

@@ -44,6 +44,7 @@ pub(crate) use plan::volume_plan;
 pub(crate) use scatter::Scatter;
 
 use crate::failure::Failure;
+use crate::made_by::made_by;
 use crate::run::{note_failure, utc_now};
 use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
@@ -184,6 +185,7 @@ impl WorkVolume<'_> {
                 ..self.lines_instrument(instrument)
             },
             started: utc_now(),
+            program: Some(made_by()),
             calibration,
             targets_m: Vec::new(),
             runs: 1,

@@ -1,14 +1,12 @@
 //! The uncertainty budget of a linear axis on its page: U over the position, and what makes it.
 
-use core::fmt::Write as _;
-
 use units::Metres;
 
 use crate::linear::record::{BudgetRecord, CombinedRecord, PlaceRecord};
 use crate::linear::{LinearContent, ZeroEntry};
 use crate::program::linear::uncertainty;
+use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::program::page::escape;
-use crate::program::page::svg::{Axes, FORWARD, HEIGHT, REVERSE, WIDTH, grid, padded};
 
 /// Less than this share of itself is no variation that a curve could show.
 const VARIES: f64 = 0.01;
@@ -26,7 +24,7 @@ pub(super) fn html(content: &LinearContent) -> String {
 }
 
 /// The budget of the last zero.
-pub(super) fn of_last(zeros: &[ZeroEntry]) -> String {
+pub(super) fn of_last<'z>(zeros: impl Iterator<Item = &'z ZeroEntry>) -> String {
     let last = zeros.last().and_then(uncertainty::of_zero);
     last.map_or_else(String::new, |it| it.table())
 }
@@ -45,36 +43,24 @@ fn varies(budget: &BudgetRecord) -> bool {
 }
 
 fn curve(budget: &BudgetRecord) -> String {
-    let axes = Axes {
-        x: padded(
-            budget.places.iter().map(|it| Metres(it.position_m).mm()),
-            0.02,
-        ),
-        y: padded(expanded(budget).chain([0.0]), 0.06),
-    };
-    let mut svg = format!("<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">");
-    svg += "<title>Expanded uncertainty of the deviation</title>";
-    svg += &grid(&axes, ("position (mm)", "U, k = 2 (µm)"));
-    svg += &line(&axes, budget, FORWARD, |it| it.forward);
-    svg += &line(&axes, budget, REVERSE, |it| it.reverse);
-    svg + "</svg>"
-}
-
-fn line(
-    axes: &Axes,
-    budget: &BudgetRecord,
-    colour: &str,
-    side: fn(&PlaceRecord) -> Option<CombinedRecord>,
-) -> String {
-    let places = budget.places.iter();
-    let points = places.filter_map(|it| Some((it.position_m, side(it)?.expanded_u_m)));
-    let points = points.fold(String::new(), |mut line, (position_m, u_m)| {
-        let (x, y) = (Metres(position_m).mm(), Metres(u_m).um());
-        let _ = write!(line, "{:.1},{:.1} ", axes.px(x), axes.py(y));
-        line
+    type Side = fn(&PlaceRecord) -> Option<CombinedRecord>;
+    let sides: [(&str, &str, Side); 2] = [
+        ("forward ↑", BLUE, |it| it.forward),
+        ("reverse ↓", ORANGE, |it| it.reverse),
+    ];
+    let series = sides.map(|(name, colour, side)| {
+        let places = budget.places.iter();
+        let points = places.filter_map(|it| {
+            let u = Metres(side(it)?.expanded_u_m).um();
+            Some((Metres(it.position_m).mm(), u))
+        });
+        Series::new(name, colour, Mark::Line, points.collect())
     });
-    format!(
-        "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>"
+    chart(
+        "Expanded uncertainty of the deviation",
+        ("position (mm)", "U, k = 2 (µm)"),
+        &series,
+        None,
     )
 }
 

@@ -1,0 +1,141 @@
+//! The head of a linear axis's page.
+
+use compensator::budget::Combined;
+use compensator::iso230::Figures;
+use machine::records::{CalibrationRecord, EnvironmentRecord, ReadJournal};
+use units::Metres;
+
+use crate::linear::measure::largest_closure;
+use crate::linear::record::{CombinedRecord, PlaceRecord};
+use crate::linear::{CriterionEntry, LinearContent, LinearLog, PointEntry, UncertaintyAtTarget};
+use crate::program::linear::uncertainty;
+use crate::program::page::head::{Fact, Made, Stated, facts_of};
+use crate::program::text;
+
+/// The head of the page of `journal`; `made` are the calibrations made from it.
+pub(crate) fn head(
+    journal: &ReadJournal<LinearLog>,
+    figures: Option<&Figures>,
+    made: &[(String, CalibrationRecord<LinearContent>)],
+) -> Vec<Fact> {
+    let log = &journal.log;
+    let stated = Stated {
+        environment: environment(&log.points),
+        corrections: corrections(journal),
+        uncertainty: uncertainty_of(log, made.first().map(|(_, it)| &it.content)),
+        verdict: verdict(log.criterion.as_ref(), figures),
+        conformity: figures.map(conformity),
+        sign: "deviation = actual − target; compensation = −deviation; B = mean ↑ − mean ↓",
+        made: made
+            .iter()
+            .map(|(id, _)| ("calibration".into(), id.clone()))
+            .collect(),
+    };
+    let mut facts = facts_of(journal, stated);
+    if !log.points.is_empty() {
+        let count = log.points.len();
+        facts.push(Fact::new("points", count.to_string()));
+        let closure = largest_closure(&log.closures);
+        facts.push(Fact::new("datum after the runs", text::closure(closure)));
+    }
+    facts
+}
+
+/// Only of what was measured: a job and a zero know no uncorrected state.
+fn corrections(journal: &ReadJournal<LinearLog>) -> Vec<Made> {
+    let header = &journal.header;
+    if header.verb == "zero" {
+        return Vec::new();
+    }
+    vec![Made {
+        name: "error table of the axis".into(),
+        is_made: header.calibration.is_some(),
+        // It is measured as found on purpose.
+        is_missed: false,
+    }]
+}
+
+/// The means over all points, and from where to where each was.
+fn environment(points: &[PointEntry]) -> Option<String> {
+    type Quantity = (
+        &'static str,
+        &'static str,
+        usize,
+        fn(&EnvironmentRecord) -> Option<f64>,
+    );
+    const QUANTITIES: [Quantity; 4] = [
+        ("air", "°C", 3, |it| it.air_temperature_c),
+        ("material", "°C", 3, |it| it.material_temperature_c),
+        ("pressure", "hPa", 2, |it| Some(it.pressure_pa? / 100.0)),
+        ("humidity", "%", 1, |it| Some(it.relative_humidity? * 100.0)),
+    ];
+    let of = |(name, unit, digits, value): &Quantity| {
+        let seen: Vec<f64> = points
+            .iter()
+            .filter_map(|it| value(&it.environment))
+            .collect();
+        let mean = compensator::uncertainty::mean(&seen)?;
+        let low = seen.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = seen.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Some(format!(
+            "{name} {mean:.digits$} {unit} ({low:.digits$} to {high:.digits$})"
+        ))
+    };
+    let told: Vec<_> = QUANTITIES.iter().filter_map(of).collect();
+    (!told.is_empty()).then(|| told.join(", "))
+}
+
+fn uncertainty_of(log: &LinearLog, made: Option<&LinearContent>) -> Option<String> {
+    if let Some(made) = made {
+        return Some(uncertainty::sentence(made));
+    }
+    let of_zeros = log.zeros.last().map(|it| {
+        let expanded = Metres(it.standard_uncertainty_m) * 2.0;
+        format!("of the zero: U (k = 2) {:.3} µm", expanded.um())
+    });
+    let targets: Vec<_> = log
+        .criterion
+        .iter()
+        .flat_map(|it| &it.targets)
+        .map(at_target)
+        .collect();
+    uncertainty::of_targets(&targets).or(of_zeros)
+}
+
+fn at_target(it: &PlaceRecord) -> UncertaintyAtTarget {
+    let combined = |it: CombinedRecord| Combined {
+        standard_uncertainty: Metres(it.u_m),
+        degrees_of_freedom: it.degrees_of_freedom,
+    };
+    UncertaintyAtTarget {
+        target: Metres(it.position_m),
+        forward: it.forward.map(combined),
+        reverse: it.reverse.map(combined),
+    }
+}
+
+fn verdict(
+    criterion: Option<&CriterionEntry>,
+    figures: Option<&Figures>,
+) -> Option<(String, bool)> {
+    let (tolerance, figures) = (Metres(criterion?.tolerance_m), figures?);
+    let seen = figures.accuracy.bidirectional;
+    let is_within = seen <= tolerance;
+    let text = text::verdict(
+        &format!("A = {:.3} µm", seen.um()),
+        &format!("{:.3} µm", tolerance.um()),
+        is_within,
+    );
+    Some((text, is_within))
+}
+
+fn conformity(figures: &Figures) -> (String, bool) {
+    let it = &figures.conformity;
+    let lack = text::lack(it);
+    let is_so = lack.is_none();
+    let conforms = format!(
+        "ISO 230-2: {} runs from each side at {} targets, as the standard asks ({} at {})",
+        it.runs, it.targets, it.runs_wanted, it.targets_wanted
+    );
+    (lack.unwrap_or(conforms), is_so)
+}

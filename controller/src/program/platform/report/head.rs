@@ -1,0 +1,82 @@
+//! The head of the page of a platform's run.
+
+use machine::records::{ReadJournal, short};
+use units::Metres;
+
+use super::{Named, Visit};
+use crate::platform::PlatformLog;
+use crate::program::page::head::{Fact, IN_USE, Made, Stated, facts_of};
+use crate::program::text::verdict;
+
+/// The head of the page of `journal`, with the calibrations that were made from it.
+pub(crate) fn head(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -> Vec<Fact> {
+    let log = &journal.log;
+    let measured = log.poses.iter().any(|it| it.target.is_some());
+    let stated = Stated {
+        environment: None,
+        corrections: match measured {
+            true => vec![Made {
+                name: "models of the screws".into(),
+                is_made: journal.header.calibration.is_some(),
+                is_missed: false,
+            }],
+            false => Vec::new(),
+        },
+        uncertainty: uncertainty(calibrations),
+        verdict: judged(journal),
+        conformity: Some((
+            "seen by a camera in the plane, which no standard describes".into(),
+            true,
+        )),
+        sign: "error = seen − target; deviation = stroke seen − stroke commanded",
+        made: made(calibrations),
+    };
+    let mut facts = facts_of(journal, stated);
+    for it in facts.iter_mut().filter(|it| it.name == IN_USE) {
+        it.value = named(&it.value);
+    }
+    let count = log.strokes.len() + log.poses.len();
+    facts.push(Fact::new("points", count.to_string()));
+    facts
+}
+
+/// The calibrations' names as short as elsewhere.
+fn named(in_use: &str) -> String {
+    let each = in_use.split(' ').map(|it| match it.split_once('=') {
+        Some((axis, id)) => format!("{axis} {}", short(id)),
+        None => it.to_owned(),
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
+fn made(calibrations: &[Named]) -> Vec<(String, String)> {
+    let each = calibrations.iter();
+    each.map(|(id, it)| (format!("screw {}", it.head.axis), id.clone()))
+        .collect()
+}
+
+/// By the scatter of stops, the screw that scatters most.
+fn uncertainty(calibrations: &[Named]) -> Option<String> {
+    let scatters = calibrations
+        .iter()
+        .filter_map(|(_, it)| it.content.scatter_m);
+    let most = scatters.reduce(f64::max)?;
+    let expanded = Metres(most) * 2.0;
+    Some(format!(
+        "of a single stop, by the scatter of the strokes: U (k = 2) {:.3} µm",
+        expanded.um()
+    ))
+}
+
+fn judged(journal: &ReadJournal<PlatformLog>) -> Option<(String, bool)> {
+    let visit = (String::new(), journal);
+    let visit = Visit::of(&visit);
+    let (seen, tolerance) = (visit.figures.largest, visit.tolerance?);
+    let is_within = seen <= tolerance;
+    let text = verdict(
+        &format!("largest error of a pose {:.3} µm", seen.um()),
+        &format!("{:.3} µm", tolerance.um()),
+        is_within,
+    );
+    (!visit.poses.is_empty()).then_some((text, is_within))
+}
