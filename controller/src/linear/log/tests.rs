@@ -1,4 +1,5 @@
 use super::*;
+use crate::linear::HeldEntry;
 use crate::store::test_run::{hash, header};
 use crate::store::{EnvironmentRecord, Journal, read_journal};
 use std::fs;
@@ -85,4 +86,29 @@ fn a_run_cut_short_counts_once_however_often_it_is_resumed() {
         read_journal::<LinearLog>(&path).unwrap().log.points,
         read.log.points
     );
+}
+
+#[test]
+fn a_sweep_has_a_voltage_of_each_sensor_at_each_place() {
+    let held = HeldEntry {
+        position_m: 0.0,
+        peak_v: 1.6,
+        slope_v: 0.0,
+    };
+    let sweep = |slope_v: Vec<f64>| {
+        LinearEntry::HallSweep(HallSweepEntry {
+            positions_m: vec![-1e-3, 1e-3],
+            peak_v: vec![0.6, 0.6],
+            slope_v,
+            peak_m: 0.0,
+            peak_max_v: 1.6,
+            g1: held,
+            g2: held,
+            p0: held,
+        })
+    };
+    let judged = |entry: LinearEntry| LinearLog::default().judge(&header(), &entry);
+    assert!(judged(sweep(vec![-1.3, 1.3])).is_ok());
+    assert!(judged(sweep(vec![-1.3])).is_err());
+    assert!(judged(sweep(vec![-1.3, f64::NAN])).is_err());
 }

@@ -225,3 +225,32 @@ pub(crate) fn facts(facts: &[Fact]) -> String {
     });
     format!("<table class=\"head\">{rows}</table>")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(instrument: &InstrumentRecord, others: &[Made]) -> String {
+        facts(&corrections(instrument, others))
+    }
+
+    #[test]
+    fn a_correction_that_should_have_been_made_is_a_red_line_and_one_left_out_on_purpose_is_none() {
+        let mut instrument = InstrumentRecord {
+            material_corrected: true,
+            ..InstrumentRecord::default()
+        };
+        let table = Made {
+            name: "error table".into(),
+            is_made: false,
+            is_missed: false,
+        };
+        let html = lines(&instrument, core::slice::from_ref(&table));
+        assert!(html.contains("<td>material</td>") && html.contains("<td>error table</td>"));
+        assert!(!html.contains("class=\"warning\""), "{html}");
+        instrument.switched_off = vec!["air".into()];
+        let html = lines(&instrument, core::slice::from_ref(&table));
+        let red = html.split("class=\"warning\"").nth(1).expect("a red line");
+        assert!(red.contains("NOT CORRECTED for air, error table"), "{html}");
+    }
+}

@@ -26,6 +26,7 @@ pub(crate) fn polar(title: &str, unit: &str, curve: &[Sure], factor: f64) -> Str
     let at = |degrees: f64, value: f64| place(degrees, radius(value));
     let mut svg = opened(title, (WIDTH, HEIGHT));
     svg += &rays();
+    svg += &circles(most, radius);
     let edge = |sign: f64| {
         let of = move |(degrees, value, u): &Sure| at(*degrees, value + sign * 2.0 * factor * u);
         places(curve.iter().map(of))
@@ -43,8 +44,7 @@ pub(crate) fn polar(title: &str, unit: &str, curve: &[Sure], factor: f64) -> Str
         svg,
         "<path d=\"M{line}Z\" fill=\"none\" stroke=\"{BLUE}\" stroke-width=\"1.6\"/>"
     );
-    // Over the curve, so that the values can be read.
-    svg += &circles(most, radius, unit);
+    svg += &labels(most, radius, unit);
     svg + "</svg>"
 }
 
@@ -61,33 +61,50 @@ fn places(each: impl Iterator<Item = (f64, f64)>) -> String {
     })
 }
 
-/// Zero, and round values to both sides of it.
-fn circles(most: f64, radius: impl Fn(f64) -> f64, unit: &str) -> String {
+/// Zero, and round values to both sides of it that `most` reaches; with their step.
+fn round_values(most: f64) -> (impl Iterator<Item = f64>, f64) {
     let step = step(most, 2.0);
+    let values = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|at| at * step);
+    let shown = values.into_iter().filter(move |it| it.abs() <= most * 1.2);
+    (shown, step)
+}
+
+fn circles(most: f64, radius: impl Fn(f64) -> f64) -> String {
     let (x, y) = CENTRE;
-    let mut svg = String::from("<g fill=\"none\" font-size=\"12\">");
-    for at in [-2.0, -1.0, 0.0, 1.0, 2.0] {
-        let value = at * step;
-        if value.abs() > most * 1.2 {
-            continue;
-        }
-        let r = radius(value);
-        let colour = if at == 0.0 {
+    let (values, _) = round_values(most);
+    let circles = values.fold(String::new(), |mut svg, value| {
+        let (r, is_zero) = (radius(value), value == 0.0);
+        let colour = if is_zero {
             "var(--zero)"
         } else {
             "var(--grid)"
         };
-        let (text, (text_x, text_y)) = (label(value, step), place(LABELS, r));
         let _ = write!(
             svg,
-            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r:.1}\" stroke=\"{colour}\"/>\
-             <text x=\"{text_x:.1}\" y=\"{:.1}\" fill=\"var(--quiet)\" stroke=\"var(--paper)\" stroke-width=\"4\" \
-             paint-order=\"stroke\" text-anchor=\"middle\">{text} {}</text>",
-            text_y + 4.0,
-            escape(unit)
+            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r:.1}\" stroke=\"{colour}\"/>"
         );
-    }
-    svg + "</g>"
+        svg
+    });
+    format!("<g fill=\"none\">{circles}</g>")
+}
+
+/// What the circles stand for, on a ground of its own: the curve may pass beneath.
+fn labels(most: f64, radius: impl Fn(f64) -> f64, unit: &str) -> String {
+    let (values, step) = round_values(most);
+    let unit = escape(unit);
+    let labels = values.fold(String::new(), |mut svg, value| {
+        let (text, (x, y)) = (label(value, step), place(LABELS, radius(value)));
+        let _ = write!(
+            svg,
+            "<text x=\"{x:.1}\" y=\"{:.1}\">{text} {unit}</text>",
+            y + 4.0
+        );
+        svg
+    });
+    format!(
+        "<g font-size=\"12\" fill=\"var(--quiet)\" stroke=\"var(--paper)\" stroke-width=\"4\" paint-order=\"stroke\" \
+         text-anchor=\"middle\">{labels}</g>"
+    )
 }
 
 fn rays() -> String {

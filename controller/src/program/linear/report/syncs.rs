@@ -32,3 +32,26 @@ pub(super) fn html(syncs: &[SyncsEntry]) -> String {
     html + "</table><p class=\"note\">How late so many of the SYNCs were at most, in wall time, since the program was \
             connected.</p>"
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_latest_sync_of_each_bus_is_told_in_microseconds() {
+        let it = SyncsEntry {
+            bus: "can0".into(),
+            sent: 4000,
+            skipped: 2,
+            shares: vec![0.5, 1.0],
+            late_s: vec![31e-6, 2.5e-3],
+        };
+        let html = html(&[it]);
+        assert!(
+            html.contains("<th>50 % (µs)</th><th>100 % (µs)</th>"),
+            "{html}"
+        );
+        assert!(html.contains("<td>can0</td><td>4000</td><td>2</td><td>31</td><td>2500</td>"));
+        assert!(super::html(&[]).is_empty());
+    }
+}
