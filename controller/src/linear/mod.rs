@@ -61,9 +61,11 @@ pub(crate) use config::{
     VerifyConfig, ZeroConfig,
 };
 pub(crate) use datum_in_use::Datum;
+#[cfg(feature = "program")]
+pub(crate) use entries::HeldEntry;
 pub(crate) use entries::{
-    CriterionEntry, HallSweepEntry, HeldEntry, JobEntry, PointEntry, ReachedEntry, RotationEntry,
-    SyncsEntry, WentOnEntry, ZeroEntry,
+    CriterionEntry, HallSweepEntry, JobEntry, PointEntry, ReachedEntry, RotationEntry, SyncsEntry,
+    WentOnEntry, ZeroEntry,
 };
 pub(crate) use finding::PatternFinding;
 #[cfg(feature = "program")]

@@ -477,6 +477,10 @@ fn check_platform_calibration(desk: &Desk, calibrated: &PlatformCalibrated) {
         closure,
         &[(&text, "closure "), (&page, "the zero was off by ")],
     );
+    let screws = list(&json, "/screws").iter();
+    let most = screws.map(|it| at(it, "/uncertainty/largest/expanded_um"));
+    let head = "of the least certain screw: U (k = 2) up to ";
+    everywhere(most.fold(0.0, f64::max), &[(&page, head)]);
     for screw in list(&json, "/screws") {
         let axis = screw["axis"].as_str().unwrap();
         let (lines, record) = desk.shown(screw["calibration"].as_str().unwrap());

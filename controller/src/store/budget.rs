@@ -121,6 +121,7 @@ impl PlacesBudgetRecord {
     }
 
     /// The least certain place; `None` of a record without any.
+    #[cfg(feature = "program")]
     pub(crate) fn least_certain(&self) -> Option<&PlaceBudgetRecord> {
         let places = self.places.iter();
         places.reduce(|most, it| if it.u_si > most.u_si { it } else { most })
@@ -180,8 +181,9 @@ const SENSITIVITY: Limits = limits(-1e12, 1e12, "SI units per unit");
 const AT: Limits = limits(-1e3, 1e3, "m or rad");
 /// How well an uncertainty is known.
 pub(crate) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
-/// A figure that follows from others may differ by rounding.
-pub(crate) const ROUNDING: f64 = 1e-9;
+/// A figure that follows from others may differ by rounding: where an uncertainty is computed once as a whole and once part by
+/// part, of equations as badly conditioned as they may be, far more than a digit of it.
+pub(crate) const ROUNDING: f64 = 1e-6;
 
 /// Whether the lines of a budget can be so, with its coverage factor.
 pub(crate) fn judge_lines(lines: &[ContributionRecord], factor: f64) -> Judged {

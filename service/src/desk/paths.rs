@@ -25,12 +25,12 @@ impl Desk {
             (RunKind::Path, None) => {
                 let what = "a run of a path without `path`";
                 let help = "give its rows: \"time_s,x_mm,y_mm,z_mm\\n0,10,10,10\\n1,20,10,10\"";
-                return Err(Problem::new(Code::BadRequest, what, help));
+                return Err(Problem::new(Code::Refused, what, help));
             }
             (_, None) => return Ok(None),
             (_, Some(_)) => {
                 let what = "`path` is for runs of the kind `path`";
-                return Err(Problem::new(Code::BadRequest, what, "leave it out"));
+                return Err(Problem::new(Code::Refused, what, "leave it out"));
             }
         };
         require_short(rows)?;
@@ -46,7 +46,7 @@ impl Desk {
             let problem = Problem::from(&failure);
             match failure {
                 truestage::Failure::Usage { .. } => {
-                    Problem::new(Code::BadRequest, problem.cause, problem.help)
+                    Problem::new(Code::Refused, problem.cause, problem.help)
                 }
                 _ => problem,
             }
@@ -63,7 +63,7 @@ fn require_short(rows: &str) -> Result<(), Problem> {
     match takes {
         Some(takes) if takes > LONGEST_S => {
             let what = format!("`path` takes {takes} s, and at most {LONGEST_S} s are followed");
-            Err(Problem::new(Code::BadRequest, what, "divide it"))
+            Err(Problem::new(Code::Refused, what, "divide it"))
         }
         Some(_) | None => Ok(()),
     }

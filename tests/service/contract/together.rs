@@ -377,26 +377,26 @@ fn follows_paths(bed: &Bed<'_>) {
         }
     };
     let slip = path("0,60,40,30\n1,6O,40,30\n");
-    refused(&slip, Code::BadRequest, &["line 3, column x_mm", "`6O`"]);
+    refused(&slip, Code::Refused, &["line 3, column x_mm", "`6O`"]);
     let beyond = path("0,499,40,30\n1,501,40,30\n");
     refused(&beyond, Code::Refused, &["outside the calibrated"]);
     let hasty = path("0,60,40,30\n0.1,90,40,30\n");
     refused(&hasty, Code::Refused, &["axis x"]);
     refused(
         &path("0,60,40,30\n601,61,40,30\n"),
-        Code::BadRequest,
+        Code::Refused,
         &["601 s"],
     );
     let none = RunRequest {
         path: None,
         ..slip.clone()
     };
-    refused(&none, Code::BadRequest, &["`path`"]);
+    refused(&none, Code::Refused, &["`path`"]);
     let other = RunRequest {
         kind: RunKind::Verify,
         ..slip
     };
-    refused(&other, Code::BadRequest, &["`path`"]);
+    refused(&other, Code::Refused, &["`path`"]);
 
     // A corner, which a spline does not turn straight.
     let corner = path("0,60,40,30\n1,64,40,30\n2,64,44,30\n");

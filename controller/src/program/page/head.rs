@@ -116,9 +116,7 @@ pub(crate) fn facts_of<L>(journal: &ReadJournal<L>, stated: Stated) -> Vec<Fact>
         "uncertainty",
         unknown(stated.uncertainty, "NOT STATED by this run"),
     ));
-    let (verdict, is_good) = stated
-        .verdict
-        .unwrap_or(("nothing is judged in this run".into(), true));
+    let (verdict, is_good) = verdict_of(journal.complete, stated.verdict);
     facts.push(Fact::new("tolerance", verdict).red_if(!is_good));
     let (conformity, is_so) = stated
         .conformity
@@ -127,6 +125,15 @@ pub(crate) fn facts_of<L>(journal: &ReadJournal<L>, stated: Stated) -> Vec<Fact>
     facts.push(Fact::new("sign", stated.sign));
     facts.push(Fact::new("hashes", hashes(journal, &stated.made)));
     facts
+}
+
+/// What was judged so far of a run that did not come to its end is no verdict.
+fn verdict_of(is_complete: bool, judged: Option<(String, bool)>) -> (String, bool) {
+    match judged {
+        Some(judged) if is_complete => judged,
+        Some(_) => ("NOT JUDGED: the run did not come to its end".into(), false),
+        None => ("nothing is judged in this run".into(), true),
+    }
 }
 
 /// What the run was, and how it went.

@@ -7,6 +7,7 @@ use super::{Named, Visit};
 use crate::platform::PlatformLog;
 use crate::program::page::head::{Fact, IN_USE, Made, Stated, facts_of};
 use crate::program::text::verdict;
+use crate::store::budget::PlacesBudgetRecord;
 
 /// The head of the page of `journal`, with the calibrations that were made from it.
 pub(crate) fn head(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -> Vec<Fact> {
@@ -55,16 +56,16 @@ fn made(calibrations: &[Named]) -> Vec<(String, String)> {
         .collect()
 }
 
-/// By the scatter of stops, the screw that scatters most.
+/// Of a single stop, as moves state it: that of the screw that is least certain.
 fn uncertainty(calibrations: &[Named]) -> Option<String> {
-    let scatters = calibrations
+    let budgets = calibrations
         .iter()
-        .filter_map(|(_, it)| it.content.scatter_m);
-    let most = scatters.reduce(f64::max)?;
-    let expanded = Metres(most) * 2.0;
+        .filter_map(|(_, it)| it.content.budget.as_ref());
+    let worst = budgets.filter_map(PlacesBudgetRecord::least_certain);
+    let most = worst.map(|it| it.expanded_u_si).reduce(f64::max)?;
     Some(format!(
-        "of a single stop, by the scatter of the strokes: U (k = 2) {:.3} µm",
-        expanded.um()
+        "of a single stop of the least certain screw: U (k = 2) up to {:.3} µm",
+        Metres(most).um()
     ))
 }
 
