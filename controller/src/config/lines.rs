@@ -1,6 +1,9 @@
 //! The lines of a machine's file as somebody sees them, comments included: what the values stand for is judged
 //! elsewhere, by the keys.
 
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
+
 use super::diagnostic::Diagnostic;
 
 /// What an example's value is followed by that the owner of the machine must replace.
@@ -17,11 +20,7 @@ pub(crate) enum Line<'a> {
         path: String,
     },
     /// `soft_min_mm = -3.0   # FILL IN`
-    Key {
-        name: &'a str,
-        value: &'a str,
-        is_marked: bool,
-    },
+    Key { name: &'a str, value: &'a str },
 }
 
 /// Each line of `text` that says something, with its number, counted from 1. Sections and keys stand in lines of
@@ -34,15 +33,15 @@ pub(crate) fn lines(text: &str) -> Vec<(usize, Line<'_>)> {
 }
 
 fn read<'a>(line: &'a str, heads: &mut Vec<&'a str>) -> Option<Line<'a>> {
-    let (said, comment) = parted(line);
+    let said = said(line);
     if let Some((name, value)) = said.split_once('=') {
         return Some(Line::Key {
             name: name.trim(),
             value: value.trim(),
-            is_marked: comment.trim_start_matches('#').trim() == MARK,
         });
     }
-    let text = said.strip_prefix('[').map(|_| said)?;
+    let is_row = said.contains(',');
+    let text = (said.starts_with('[') && said.ends_with(']') && !is_row).then_some(said)?;
     let path = text.trim_start_matches('[').trim_end_matches(']').trim();
     let before = heads.iter().filter(|it| **it == path).count();
     heads.push(path);
@@ -53,46 +52,77 @@ fn read<'a>(line: &'a str, heads: &mut Vec<&'a str>) -> Option<Line<'a>> {
     Some(Line::Section { text, path })
 }
 
-/// Every value that is marked, at its place.
+/// Every value that is marked, at the line of its mark: wherever a person may have written it, and whatever beside it.
 pub(super) fn unfilled(text: &str, file: &str) -> Vec<Diagnostic> {
-    let mut section = String::new();
-    let mut found = Vec::new();
-    for (line, it) in lines(text) {
-        match it {
-            Line::Section { path, .. } => section = path,
-            Line::Key {
-                name,
-                value,
-                is_marked: true,
-            } => found.push(Diagnostic {
-                file: file.to_owned(),
-                line,
-                column: 1,
-                key: below(&section, name),
-                cause: format!("{value} is an example's"),
-                help: String::new(),
-            }),
-            Line::Key { .. } => {}
+    let lines = lines(text);
+    let marks = comments(text).filter(|(_, it)| is_mark(it));
+    let found = marks.map(|(line, comment)| {
+        let (key, cause) = marked(&lines, line);
+        Diagnostic {
+            file: file.to_owned(),
+            line,
+            column: 1,
+            key,
+            cause: cause
+                .unwrap_or_else(|| format!("`{comment}` says that something here is an example's")),
+            help: String::new(),
         }
-    }
+    });
+    let mut found: Vec<_> = found.collect();
     if let Some(last) = found.last_mut() {
         last.help = format!("write what this machine has, and remove `# {MARK}`");
     }
     found
 }
 
-/// What a line says, and the comment behind it.
-fn parted(line: &str) -> (&str, &str) {
-    let mut quote = None;
-    for (at, it) in line.char_indices() {
-        match (quote, it) {
-            (None, '#') => return (line[..at].trim(), line[at..].trim()),
-            (None, '"' | '\'') => quote = Some(it),
-            (Some(open), it) if it == open => quote = None,
-            _ => {}
+/// Each comment, with the number of its line.
+fn comments(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let tokens = Source::new(text).lex();
+    let comments = tokens.filter(|it| it.kind() == TokenKind::Comment);
+    comments.filter_map(move |it| {
+        let (start, end) = (it.span().start(), it.span().end());
+        let line = text.get(..start)?.matches('\n').count() + 1;
+        Some((line, text.get(start..end)?))
+    })
+}
+
+/// Whether `comment` has the words of the mark in it: `# fill in`, `# FILL IN: ask Tom`, `# (Fill-in)`.
+fn is_mark(comment: &str) -> bool {
+    let words = comment.split(|it: char| !it.is_alphanumeric());
+    let words: Vec<_> = words
+        .filter(|it| !it.is_empty())
+        .map(str::to_uppercase)
+        .collect();
+    words.windows(2).any(|it| it.join(" ") == MARK)
+}
+
+/// The key that a mark on `line` stands at, and what is to be said of its value; a mark in a line of its own may be
+/// meant for what is above it or below.
+fn marked(lines: &[(usize, Line<'_>)], line: usize) -> (String, Option<String>) {
+    let mut section = "";
+    let mut key = None;
+    for (at, it) in lines.iter().take_while(|(at, _)| *at <= line) {
+        match it {
+            Line::Section { path, .. } => (section, key) = (path, None),
+            Line::Key { name, value } => key = Some((*at, *name, *value)),
         }
     }
-    (line.trim(), "")
+    match key {
+        Some((at, name, value)) if at == line && !value.ends_with('[') => {
+            let cause = format!("{value} is an example's");
+            (below(section, name), Some(cause))
+        }
+        Some((_, name, _)) => (below(section, name), None),
+        None => (section.to_owned(), None),
+    }
+}
+
+/// What a line says before its comment.
+fn said(line: &str) -> &str {
+    let end = comments(line)
+        .next()
+        .map_or(line.len(), |(_, it)| line.len() - it.len());
+    line[..end].trim()
 }
 
 /// The key called `name` of the section at `path`.
@@ -108,24 +138,68 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sections_and_keys_are_found_with_their_marks_and_lists_are_counted() {
-        let text = "# a\n[axis.x] # b\njob = \"#1\" # FILL IN\n\n[[p.a]]\nn = 1 # FILL IN later\n[[p.a]]\n";
+    fn sections_and_keys_are_found_and_lists_are_counted() {
+        let text = "# a\n[axis.x] # b\njob = \"#1\" # c\n\n[[p.a]]\nn = 'it\\' # 'd'\n[[p.a]]\n";
         let section = |text, path: &str| Line::Section {
             text,
             path: path.into(),
         };
-        let key = |name, value, is_marked| Line::Key {
-            name,
-            value,
-            is_marked,
-        };
+        let key = |name, value| Line::Key { name, value };
         let expected = [
             (2, section("[axis.x]", "axis.x")),
-            (3, key("job", "\"#1\"", true)),
+            (3, key("job", "\"#1\"")),
             (5, section("[[p.a]]", "p.a.0")),
-            (6, key("n", "1", false)),
+            (6, key("n", "'it\\'")),
             (7, section("[[p.a]]", "p.a.1")),
         ];
         assert_eq!(lines(text), expected);
+    }
+
+    fn marks(text: &str) -> Vec<(usize, String, String)> {
+        let found = unfilled(text, "m.toml").into_iter();
+        found.map(|it| (it.line, it.key, it.cause)).collect()
+    }
+
+    #[test]
+    fn a_mark_counts_however_it_is_written_and_whatever_else_its_comment_says() {
+        for comment in [
+            "# FILL IN",
+            "# fill in",
+            "#FILL IN: ask Tom",
+            "# FILL IN, see drawing",
+            "# from Tom's, FILL  IN",
+            "# Fill-in!",
+        ] {
+            let text = format!("[axis.x]\nsoft_min_mm = -3.0{comment}\n");
+            let expected = (
+                2,
+                "axis.x.soft_min_mm".to_owned(),
+                "-3.0 is an example's".to_owned(),
+            );
+            assert_eq!(marks(&text), [expected], "{comment}");
+        }
+        for comment in ["# filled in", "# fill it in", "# refill in May", "# FILL"] {
+            assert_eq!(marks(&format!("soft_min_mm = -3.0 {comment}")), []);
+        }
+        assert_eq!(marks("name = \"# FILL IN\"\nother = '# FILL IN'"), []);
+        let quoted = marks("name = \"a\\\"b\" # FILL IN");
+        assert_eq!(quoted[0].2, "\"a\\\"b\" is an example's");
+    }
+
+    #[test]
+    fn a_mark_counts_on_whatever_line_it_stands() {
+        let list =
+            "[zero]\nindex_mm = [ # fill in\n  [1.0, 2.0], # FILL IN\n  # FILL IN\n] # FILL IN\n";
+        let found = marks(list);
+        let places: Vec<_> = found.iter().map(|(line, key, _)| (*line, &**key)).collect();
+        let key = "zero.index_mm";
+        assert_eq!(places, [(2, key), (3, key), (4, key), (5, key)]);
+        assert!(found[3].2.contains("`# FILL IN` says"), "{found:?}");
+        let section = marks("# FILL IN\n[axis.x] # FILL IN\nname = \"x\"\n");
+        let places: Vec<_> = section
+            .iter()
+            .map(|(line, key, _)| (*line, &**key))
+            .collect();
+        assert_eq!(places, [(1, ""), (2, "axis.x")]);
     }
 }

@@ -54,7 +54,7 @@ impl Draft {
                     path,
                     keys: Vec::new(),
                 }),
-                (Line::Key { name, value, .. }, Some(last)) => last.keys.push(Key {
+                (Line::Key { name, value }, Some(last)) => last.keys.push(Key {
                     name: name.to_owned(),
                     value: value.to_owned(),
                     is_marked: false,
@@ -179,8 +179,8 @@ impl Draft {
 const HEAD: &str = "\
 # A machine of truestage. configs/README.md describes every key, `truestage check` judges this file.
 #
-# A value with `FILL IN` behind it is an example's: write your machine's, and take these words away.
-# Nothing moves before. What a key means stands where it comes first.
+# A value with a mark in capitals behind it is an example's: write your machine's, and take the mark
+# away. Nothing moves before. What a key means stands where it comes first.
 
 ";
 
