@@ -5,7 +5,7 @@ use core::ops::{Deref, DerefMut};
 use drivers::transport::Transport;
 
 use crate::assemble;
-use crate::config::{ConfigHash, Loaded, MachineConfig};
+use crate::config::{ConfigHash, Diagnostic, Loaded, MachineConfig, filled_in};
 use crate::failure::Failure;
 use crate::memories::Memories;
 use crate::run;
@@ -19,6 +19,8 @@ pub struct Machine {
     pub(crate) config: MachineConfig,
     pub(crate) config_hash: ConfigHash,
     pub(crate) memories: Memories,
+    /// What the configuration has of an example.
+    unfilled: Vec<Diagnostic>,
 }
 
 impl Deref for Machine {
@@ -44,14 +46,17 @@ impl Machine {
             config: loaded.config.clone(),
             config_hash: loaded.hash.clone(),
             memories: Memories::default(),
+            unfilled: loaded.unfilled.clone(),
         }
     }
 
     /// [`machine::Machine::start`]; what was known of where things are is forgotten.
     ///
     /// # Errors
-    /// When a device does not answer, is another one than configured, or refuses its set-up.
+    /// When a device does not answer, is another one than configured, or refuses its set-up; before anything is
+    /// sent, when the configuration has values that are marked as an example's ([`Loaded::unfilled`]).
     pub fn start(&mut self) -> Result<(), Failure> {
+        filled_in(&self.unfilled)?;
         self.memories.each().for_each(|it| it.forget());
         Ok(self.core.start()?)
     }

@@ -28,7 +28,7 @@ pub struct Loaded {
     pub hash: ConfigHash,
     /// What is doubtful of it, in the order of the file.
     pub warnings: Vec<Diagnostic>,
-    /// What is still an example's value, marked as such by `truestage new`.
+    /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
     pub unfilled: Vec<Diagnostic>,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
@@ -92,12 +92,17 @@ impl Loaded {
     /// Names each value that is still an example's: nobody knows where that would send the axes.
     #[cfg(feature = "program")]
     pub(crate) fn filled_in(&self) -> Result<(), ConfigError> {
-        match self.unfilled.is_empty() {
-            true => Ok(()),
-            false => Err(ConfigError::Invalid {
-                findings: self.unfilled.clone(),
-            }),
-        }
+        filled_in(&self.unfilled)
+    }
+}
+
+/// Likewise, of a machine that was made of it.
+pub(crate) fn filled_in(unfilled: &[Diagnostic]) -> Result<(), ConfigError> {
+    match unfilled {
+        [] => Ok(()),
+        _ => Err(ConfigError::Invalid {
+            findings: unfilled.to_vec(),
+        }),
     }
 }
 

@@ -31,6 +31,8 @@ pub(crate) mod warnings;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;
+pub(crate) use diagnostic::Diagnostic;
+pub(crate) use load::filled_in;
 pub use load::{Loaded, load, parse};
 pub use model::MachineConfig;
 

@@ -201,3 +201,20 @@ fn a_compensated_move_brings_the_point_itself_to_its_target() {
 fn the_pinned_log_of_a_linear_stage_is_that_of_every_computer() {
     super::pinned::check("linear");
 }
+
+/// The library is as strict as the verbs: no program of anybody's moves by an example's limits.
+#[test]
+fn a_machine_whose_file_has_marks_does_not_start_and_nothing_is_sent() {
+    let marked = |text: String| text.edit("soft_min_mm = -3.0", "soft_min_mm = -3.0 # fill in");
+    let mut bench = Bench::with(7, marked, |text| text);
+    let begun = bench.machine.now();
+    let refused = bench.machine.start();
+    let Err(failure @ Failure::Config(_)) = refused else {
+        panic!("{refused:?}")
+    };
+    assert_eq!(failure.exit_code(), 2);
+    let said = failure.to_string();
+    assert!(said.contains("axis.x.soft_min_mm: -3.0 is an"), "{said}");
+    assert_eq!(bench.machine.power_state("x").expect("it is there"), None);
+    assert_eq!(bench.machine.now(), begun);
+}
