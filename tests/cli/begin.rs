@@ -123,7 +123,7 @@ fn what_cannot_be_is_told_and_nothing_is_written() {
 fn a_person_is_asked_for_what_every_machine_has_another_of_until_all_of_it_fits() {
     let folder = folder();
     let first = "curved\nlinear\nTS-12\n/dev/can\n/dev/laser\n0.0\n20.0\n\n33.0\n";
-    let example = "\n".repeat(10);
+    let example = "\n".repeat(11);
     let answers = format!("{first}{example}30.0\n28.7\n");
     let (seen, code) = at_a_terminal(folder.path(), &["new"], &answers);
     check_says(

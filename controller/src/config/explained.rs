@@ -130,4 +130,40 @@ mod tests {
         let title = of_section("axis.x.zero").expect("there is one").text;
         assert!(title.starts_with("[axis.NAME.zero] "), "{title}");
     }
+
+    /// How fast each `zero` of `part` and of all in it is sought, and whether every machine has a value of its own.
+    fn zero_speeds(part: &Value, name: &str, found: &mut Vec<(String, bool)>) {
+        if let Some(keys) = part["properties"].as_object().filter(|_| name == "zero") {
+            let speeds = keys.iter().filter(|(key, _)| key.contains("_speed_"));
+            found.extend(speeds.map(|(key, it)| (key.clone(), it["x-own"] == true)));
+        }
+        match part {
+            Value::Object(inner) => {
+                for (own, it) in inner {
+                    let own = match own.as_str() {
+                        "anyOf" | "oneOf" | "allOf" => name,
+                        own => own,
+                    };
+                    zero_speeds(it, own, found);
+                }
+            }
+            Value::Array(inner) => inner.iter().for_each(|it| zero_speeds(it, name, found)),
+            _ => {}
+        }
+    }
+
+    /// The first motion of a machine must not be as fast as an example.
+    #[test]
+    fn every_speed_of_a_zero_is_every_machine_s_own() {
+        let mut found = Vec::new();
+        zero_speeds(schema::inline(), "", &mut found);
+        for key in [
+            "reference_speed_mm_per_s",
+            "search_speed_mm_per_s",
+            "index_speed_deg_per_s",
+        ] {
+            assert!(found.iter().any(|(it, _)| it == key), "{key}: {found:?}");
+        }
+        assert!(found.iter().all(|(_, is_own)| *is_own), "{found:?}");
+    }
 }

@@ -26,6 +26,7 @@ pub struct ZeroConfig {
     pub reference_speed_mm_per_s: f64,
     /// Speed of the Hall search.
     #[schemars(range(min = 0.001, max = 100.0))]
+    #[schemars(extend("x-own" = true))]
     pub search_speed_mm_per_s: f64,
     /// Farthest from the nominal zero, on either side.
     #[schemars(range(min = 0.01, max = 1000.0))]

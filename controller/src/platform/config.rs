@@ -23,18 +23,22 @@ pub struct PlatformConfig {
     pub settle_ms: u32,
     /// Of the screw with the longest way; the others are slower, so that all arrive together.
     #[schemars(range(min = 0.001, max = 1000.0), extend("x-range" = "at most the axes'"))]
+    #[schemars(extend("x-own" = true))]
     pub speed_mm_per_s: f64,
     /// Likewise.
     #[schemars(range(min = 0.01, max = 1000000.0), extend("x-range" = "at most the axes'"))]
     pub acceleration_mm_per_s2: f64,
     /// The work range along x, to both sides; refused when the screws do not reach its corners.
     #[schemars(range(min = 0.0, max = 1000.0))]
+    #[schemars(extend("x-own" = true))]
     pub x_max_mm: f64,
     /// Along y.
     #[schemars(range(min = 0.0, max = 1000.0))]
+    #[schemars(extend("x-own" = true))]
     pub y_max_mm: f64,
     /// The angle, to both sides.
     #[schemars(range(min = 0.0, max = 90.0))]
+    #[schemars(extend("x-own" = true))]
     pub theta_max_deg: f64,
     /// Where errors of the angle count as lengths.
     #[schemars(range(min = 0.0, max = 10000.0))]
@@ -124,6 +128,7 @@ impl StrokesConfig {
 pub struct PlatformZeroConfig {
     /// Speed of homing one screw (method 1: negative limit switch and index pulse).
     #[schemars(range(min = 0.001, max = 1000.0))]
+    #[schemars(extend("x-own" = true))]
     pub search_speed_mm_per_s: f64,
     /// Longest homing of one screw.
     #[schemars(range(min = 0.1, max = 100000.0))]

@@ -132,9 +132,11 @@ pub struct RotaryConfig {
 #[serde(deny_unknown_fields)]
 pub struct RotaryZeroConfig {
     /// From which side the mark is sought (methods 34 and 33).
+    #[schemars(extend("x-own" = true))]
     pub index_direction: DirectionName,
     /// How fast it is sought.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_deg_per_s`"))]
+    #[schemars(extend("x-own" = true))]
     pub index_speed_deg_per_s: f64,
     /// What the mark's angle is called.
     #[schemars(range(min = 0.0, max = 360.0))]

@@ -115,6 +115,7 @@ pub struct VolumetricZeroConfig {
     pub order: [VolumeAxisName; 3],
     /// How fast the limit switch is sought.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_mm_per_s` of each axis"))]
+    #[schemars(extend("x-own" = true))]
     pub search_speed_mm_per_s: f64,
     /// For one axis.
     #[schemars(range(min = 0.1, max = 100000.0))]
