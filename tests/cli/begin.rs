@@ -150,3 +150,33 @@ fn a_person_is_asked_for_what_every_machine_has_another_of_until_all_of_it_fits(
         "{checked}"
     );
 }
+
+/// Answers are not thrown away because one of them cannot be right yet, or nobody has the next one.
+#[test]
+fn what_was_answered_at_a_terminal_is_written_though_it_does_not_fit_and_though_nobody_goes_on() {
+    let first = "linear\nTS-12\n/dev/can\n/dev/laser\n20.0\n\n33.0\n";
+    let enters = "\n".repeat(13);
+    for (last, code) in [(&*enters, 2), ("\u{4}", 2)] {
+        let folder = folder();
+        let (seen, ended) = at_a_terminal(folder.path(), &["new"], &format!("{first}{last}"));
+        assert_eq!(ended, Some(code), "{seen}");
+        check_says(&seen, &["machine.toml: written", "axis.x.calibrate.end_mm"]);
+        let written = read(folder.path());
+        for line in [
+            "stage_serial = \"TS-12\"\n",
+            "soft_max_mm = 33.0\n",
+            "soft_min_mm = -3.0   # FILL IN\n",
+        ] {
+            assert!(written.contains(line), "{line}: {written}");
+        }
+        let checked = truestage(folder.path(), &["check"]).with_code(2);
+        check_error(&checked, &["axis.x.calibrate.end_mm"]);
+    }
+    let folder = folder();
+    let (seen, ended) = at_a_terminal(folder.path(), &["new"], "linear\nTS-12\n\u{4}");
+    assert_eq!(ended, Some(0), "{seen}");
+    truestage(folder.path(), &["check"]).with_code(0);
+    let (seen, ended) = at_a_terminal(folder.path(), &["new", "other.toml"], "linear\n\u{4}");
+    check_says(&seen, &["nothing was written"]);
+    assert_eq!(ended, Some(2), "{seen}");
+}

@@ -117,6 +117,14 @@ fn marked(lines: &[(usize, Line<'_>)], line: usize) -> (String, Option<String>) 
     }
 }
 
+/// The key that stands on `line`.
+#[cfg(feature = "program")]
+pub(crate) fn key_on(text: &str, line: usize) -> Option<String> {
+    let lines = lines(text);
+    let is_key = |(at, it): &(usize, Line<'_>)| *at == line && matches!(it, Line::Key { .. });
+    lines.iter().any(is_key).then(|| marked(&lines, line).0)
+}
+
 /// What a line says before its comment.
 fn said(line: &str) -> &str {
     let end = comments(line)

@@ -11,7 +11,8 @@ pub(super) fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>>
     let document = DeTable::parse(text).ok()?;
     let mut table = document.get_ref();
     let mut span = None;
-    let mut parts = key.split('.');
+    // `actuator[0]` is `actuator.0`.
+    let mut parts = key.split(['.', '[', ']']).filter(|it| !it.is_empty());
     while let Some(own) = parts.next() {
         let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
             break;

@@ -59,7 +59,15 @@ pub(crate) fn run(args: &NewArgs, output: Output) -> Ended {
         questions::ask(&mut draft, output)?;
     }
     let text = draft.text();
-    config::parse(&text, &args.config.display().to_string())?;
+    let unfit = config::parse(&text, &args.config.display().to_string()).err();
+    // Whoever answered at a terminal does not answer all of it twice.
+    if let Some(unfit) = unfit {
+        if is_asked {
+            write(&args.config, &text)?;
+            output.note(&unfinished(&args.config));
+        }
+        return Err(unfit.into());
+    }
     write(&args.config, &text)?;
     tell(&args.config, &draft, &notes, output)
 }
@@ -113,6 +121,13 @@ fn tell(path: &Path, draft: &Draft, notes: &[String], output: Output) -> Ended {
     output.result(
         &text,
         &json!({"config": path, "to_fill_in": keys, "notes": notes}),
+    )
+}
+
+fn unfinished(path: &Path) -> String {
+    format!(
+        "{}: written with what was answered, which does not fit yet: mend it there, `truestage check` judges it",
+        path.display()
     )
 }
 

@@ -7,7 +7,8 @@ use clap::ValueEnum;
 
 use super::draft::{Draft, Place};
 use crate::Failure;
-use crate::config::{self, ConfigError};
+use crate::config::lines::key_on;
+use crate::config::{self, ConfigError, Diagnostic};
 use crate::program::demo::which::Which;
 use crate::program::output::Output;
 
@@ -18,12 +19,22 @@ pub(super) fn which(output: Output) -> Result<Which, Failure> {
         output.note(&format!("  {:<12} {}", it.0.name, it.0.help));
     }
     loop {
-        let typed = answer()?;
+        let typed = answer().ok_or_else(nobody)?;
         match Which::from_str(&typed, true) {
             Ok(which) => return Ok(which),
             Err(_) => output.note(&format!("`{typed}` is none of them")),
         }
     }
+}
+
+/// What became of a question.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    Answered,
+    /// Left as it was.
+    Left,
+    /// Nobody answers any more.
+    Over,
 }
 
 /// Asks for what every machine has another of: once, and what a scan finds not at all. Then for what does not fit
@@ -33,24 +44,39 @@ pub(super) fn ask(draft: &mut Draft, output: Output) -> Result<(), Failure> {
         "Enter leaves the example's value, in brackets, marked FILL IN. A CAN interface of the kernel is told by --port \
          can0=socketcan:can0.",
     );
+    let mut is_answered = false;
     for place in asked(draft) {
-        put(draft, &place, output)?;
-    }
-    while let Err(ConfigError::Invalid { findings }) = config::parse(&draft.text(), "") {
-        let mut is_answered = false;
-        for finding in &findings {
-            output.note(&format!(
-                "{}: {}; {}",
-                finding.key, finding.cause, finding.help
-            ));
-            let place = draft.at(&finding.key);
-            is_answered |= place.map_or(Ok(false), |it| put(draft, &it, output))?;
-        }
-        if !is_answered {
-            break;
+        match put(draft, &place, output) {
+            Asked::Answered => is_answered = true,
+            Asked::Left => {}
+            Asked::Over if is_answered => return Ok(()),
+            Asked::Over => return Err(nobody()),
         }
     }
+    while ask_again(draft, output) == Asked::Answered {}
     Ok(())
+}
+
+/// For what does not fit, each once.
+fn ask_again(draft: &mut Draft, output: Output) -> Asked {
+    let mut ended = Asked::Left;
+    let text = draft.text();
+    let Err(ConfigError::Invalid { findings }) = config::parse(&text, "") else {
+        return ended;
+    };
+    for it in &findings {
+        output.note(&format!("{}: {}; {}", it.key, it.cause, it.help));
+        let place = draft.at(&it.key);
+        let Some(place) = place.or_else(|| draft.at(&key_on(&text, it.line)?)) else {
+            continue;
+        };
+        match put(draft, &place, output) {
+            Asked::Answered => ended = Asked::Answered,
+            Asked::Left => {}
+            Asked::Over => return Asked::Over,
+        }
+    }
+    ended
 }
 
 /// Whether a scan finds it.
@@ -70,8 +96,7 @@ fn asked(draft: &Draft) -> Vec<Place> {
     places
 }
 
-/// Whether there is an answer.
-fn put(draft: &mut Draft, place: &Place, output: Output) -> Result<bool, Failure> {
+fn put(draft: &mut Draft, place: &Place, output: Output) -> Asked {
     let Place {
         path,
         value,
@@ -79,39 +104,62 @@ fn put(draft: &mut Draft, place: &Place, output: Output) -> Result<bool, Failure
     } = place;
     output.note(&format!("{path} [{value}]: {}", explained.text));
     loop {
-        let typed = answer()?;
+        let Some(typed) = answer() else {
+            return Asked::Over;
+        };
         if typed.is_empty() {
-            return Ok(false);
+            return Asked::Left;
         }
         let mut tried = draft.clone();
         tried.set(path, &typed);
-        let wrong = match config::parse(&tried.text(), "") {
-            Err(ConfigError::Invalid { findings }) => {
-                findings.into_iter().find(|it| it.key == *path)
-            }
-            _ => None,
-        };
-        match wrong {
+        match wrong(&tried, path) {
             Some(it) => output.note(&format!("{}; {}", it.cause, it.help)),
             None => {
                 *draft = tried;
-                return Ok(true);
+                return Asked::Answered;
             }
         }
     }
 }
 
-fn answer() -> Result<String, Failure> {
-    let mut typed = String::new();
-    match stdin().lock().read_line(&mut typed) {
-        Ok(0) => Err(Failure::Usage {
-            what: "nobody answers; nothing was written".into(),
-            help: "give --machine and --set, and --yes to be asked nothing".into(),
-        }),
-        Ok(_) => Ok(typed.trim().to_owned()),
-        Err(source) => Err(Failure::File {
-            path: "the terminal".into(),
-            source,
-        }),
+/// What is found of the key at `path`, or on its line: findings may name it otherwise, or not at all.
+fn wrong(draft: &Draft, path: &str) -> Option<Diagnostic> {
+    let text = draft.text();
+    let Err(ConfigError::Invalid { findings }) = config::parse(&text, "") else {
+        return None;
+    };
+    let mut findings = findings.into_iter();
+    findings.find(|it| it.key == path || key_on(&text, it.line).is_some_and(|it| it == path))
+}
+
+/// `None` when there is nobody any more.
+fn answer() -> Option<String> {
+    let mut typed = Vec::new();
+    match stdin().lock().read_until(b'\n', &mut typed) {
+        Ok(0) | Err(_) => None,
+        Ok(_) => Some(String::from_utf8_lossy(&typed).trim().to_owned()),
+    }
+}
+
+fn nobody() -> Failure {
+    Failure::Usage {
+        what: "nobody answers; nothing was written".into(),
+        help: "give --machine and --set, and --yes to be asked nothing".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_of_a_value_is_found_in_a_list_and_where_it_is_no_value_at_all() {
+        let mut draft = Draft::of(include_str!("../../../../configs/machines/uvw.toml"));
+        let path = "platform.actuator.1.direction";
+        for (typed, is_wrong) in [("[0.0, 0.0]", true), ("five", true), ("[0.0, 1.0]", false)] {
+            draft.set(path, typed);
+            assert_eq!(wrong(&draft, path).is_some(), is_wrong, "{typed}");
+            assert!(wrong(&draft, "platform.actuator.0.direction").is_none());
+        }
     }
 }
