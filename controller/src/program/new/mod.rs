@@ -39,7 +39,7 @@ pub(crate) struct NewArgs {
     /// What a key says: `axis.x.soft_max_mm=250`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Ask nothing, neither on a terminal.
+    /// Ask nothing, not even at a terminal.
     #[arg(long)]
     yes: bool,
 }
