@@ -89,6 +89,18 @@ impl Mechanics {
         }
     }
 
+    /// Whether the axis `name` does not move, whatever its drive says of its target.
+    pub(super) fn is_at_rest(&self, machine: &Machine, name: &str) -> bool {
+        let at_rest = match self {
+            Self::Linear(_) => machine.reading(name).ok().flatten().map(|it| it.at_rest),
+            Self::Turning(_) => {
+                let reading = machine.devices().rotary_reading(name).ok().flatten();
+                reading.map(|it| it.at_rest)
+            }
+        };
+        at_rest.unwrap_or(false)
+    }
+
     /// Where the point of the axis `name` is when its encoder says `encoder`; `None` where nothing corrects that.
     pub(super) fn place(
         &self,

@@ -242,7 +242,7 @@ impl Keeper {
                 Ok(is_over.then(|| end.clone()))
             }
             Phase::Moving => match &motion.together {
-                Some(together) => Ok(self.advance_together(machine, together)),
+                Some(_) => Ok(self.advance_together(machine, number)),
                 None => self.advance_legs(machine, number),
             },
         }
@@ -272,17 +272,18 @@ impl Keeper {
         let mut late = legs.iter();
         let late = late.find(|it| it.phase != LegPhase::There && now >= it.deadline);
         if let Some(leg) = late {
-            let end = End::TimedOut(self.overdue(leg));
+            let (at, waited) = (leg.at, self.seats[leg.at].move_timeout);
+            let end = End::TimedOut(self.overdue(at, "move", waited));
             self.stop_motion(machine, number, end);
         }
         Ok(None)
     }
 
-    fn overdue(&self, leg: &Leg) -> Cause {
+    fn overdue(&self, at: usize, step: &'static str, waited: Duration) -> Cause {
         cause_of(&truestage::Failure::from(Failure::Overdue {
-            device: self.name(leg.at).to_string(),
-            step: "move",
-            waited: self.seats[leg.at].move_timeout,
+            device: self.name(at).to_string(),
+            step,
+            waited,
         }))
     }
 

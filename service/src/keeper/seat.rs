@@ -105,6 +105,14 @@ impl Seat {
         since.is_some_and(|since| now.since(since) >= self.in_position)
     }
 
+    /// Whether it is in position, or is one that a loop has left where it does not move: a drive need not say of a
+    /// target that it was sent period by period that it has been reached.
+    pub(super) fn rests(&self, machine: &Machine) -> bool {
+        let left_by_a_loop = self.moved == Moved::CorrectedTogether;
+        self.is_in_position(machine.now())
+            || left_by_a_loop && self.mechanics.is_at_rest(machine, &self.name)
+    }
+
     /// Within which it is moved, and what corrects that, where it goes along a way.
     pub(super) fn linear(&self) -> Option<(&AxisSettings, &Course)> {
         match &self.mechanics {

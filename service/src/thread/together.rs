@@ -13,9 +13,9 @@ impl Kept {
         let result = group.move_to(machine, &self.store, &asked, teller);
         let mut keeper = self.keeper.borrow_mut();
         match result {
-            Ok(moved) => keeper.end_procedure_of(id, Some(moved)),
+            Ok(moved) => keeper.end_procedure_of(&self.machine, id, Some(moved)),
             Err(failure) => {
-                keeper.end_procedure_of(id, None);
+                keeper.end_procedure_of(&self.machine, id, None);
                 drop(keeper);
                 self.not_moved(id, failure);
             }

@@ -316,7 +316,10 @@ fn moves_as_one(bed: &Bed<'_>) {
     // Line 5: the tool stays where it is, also while the correction is taken up again.
     let id = bed.begin(&point);
     let mut farthest = 0.0_f64;
-    while !bed.now(&id).state.is_end() {
+    for _ in 0..1000 {
+        if bed.now(&id).state.is_end() {
+            break;
+        }
         farthest = farthest.max((bed.encoder_mm("x") - encoder).abs());
         bed.let_time_pass(0.05);
     }

@@ -1,16 +1,18 @@
 //! Motions of axes that move as one: a procedure between two ticks, under the contract of every motion.
 
+use core::time::Duration;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use machine::Machine;
 use truestage::Agreed;
 use truestage::runs::{Group, GroupMove, GroupMoved, Moved, Place};
+use units::Time;
 
 use super::super::seat::{Seat, Task};
 use super::super::{Job, Keeper, Mode};
 use super::going::other_unit;
-use super::{End, Motion, Phase};
+use super::{End, Motion, Phase, SETTLING};
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
 use crate::request::MoveRequest;
@@ -22,8 +24,13 @@ enum Progress {
     /// It has not begun.
     Waiting,
     UnderWay,
-    /// It has ended, with this where it was made to its end.
-    Over(Option<GroupMoved>),
+    /// It has ended.
+    Over {
+        /// What it came to, where it was made to its end.
+        moved: Option<GroupMoved>,
+        /// Until when its axes must be in position.
+        deadline: Time,
+    },
 }
 
 /// What the axes of a group do in a motion.
@@ -50,8 +57,19 @@ impl Together {
     /// What it came to, where it was made to its end.
     pub(super) const fn moved(&self) -> Option<&GroupMoved> {
         match &self.progress {
-            Progress::Over(Some(moved)) => Some(moved),
-            Progress::Waiting | Progress::UnderWay | Progress::Over(None) => None,
+            Progress::Over { moved, .. } => moved.as_ref(),
+            Progress::Waiting | Progress::UnderWay => None,
+        }
+    }
+
+    /// Until when its axes must be in position, once it was made to its end.
+    const fn deadline(&self) -> Option<Time> {
+        match self.progress {
+            Progress::Over {
+                moved: Some(_),
+                deadline,
+            } => Some(deadline),
+            Progress::Over { moved: None, .. } | Progress::Waiting | Progress::UnderWay => None,
         }
     }
 
@@ -204,13 +222,20 @@ impl Keeper {
     }
 
     /// The procedure of the motion `id` has ended.
-    pub(crate) fn end_procedure_of(&mut self, id: &str, moved: Option<GroupMoved>) {
+    pub(crate) fn end_procedure_of(
+        &mut self,
+        machine: &Machine,
+        id: &str,
+        moved: Option<GroupMoved>,
+    ) {
         self.mode = Mode::Idle;
         self.motions.published = None;
         let mut active = self.motions.active.iter_mut();
         let motion = active.find(|it| *it.id == *id);
         if let Some(together) = motion.and_then(|it| it.together.as_mut()) {
-            together.progress = Progress::Over(moved);
+            let settling = settling(together, &self.seats);
+            let deadline = machine.now() + machine.patience().of(settling);
+            together.progress = Progress::Over { moved, deadline };
         }
     }
 
@@ -228,12 +253,24 @@ impl Keeper {
     }
 
     /// How motion `number` ends, when its procedure has been made to its end and the axes stand.
-    pub(super) fn advance_together(&self, machine: &Machine, together: &Together) -> Option<End> {
-        together.moved()?;
+    pub(super) fn advance_together(&mut self, machine: &mut Machine, number: usize) -> Option<End> {
+        let together = self.motions.active[number].together.as_ref()?;
+        let deadline = together.deadline()?;
         let now = machine.now();
-        let mut axes = together.axes();
-        let stand = axes.all(|at| self.seats[at].is_in_position(now));
-        stand.then_some(End::Done)
+        let stands = |at: usize| self.seats[at].is_in_position(now);
+        if together.axes().all(stands) {
+            return Some(End::Done);
+        }
+        if now < deadline {
+            return None;
+        }
+        let late = together.axes().find(|at| !self.seats[*at].rests(machine));
+        let Some(at) = late else {
+            return Some(End::Done);
+        };
+        let end = End::TimedOut(self.overdue(at, "settle", settling(together, &self.seats)));
+        self.stop_motion(machine, number, end);
+        None
     }
 
     /// What is known of the axes at rest after a motion that was made to its end.
@@ -250,6 +287,12 @@ impl Keeper {
             seat.standard_uncertainty = part.standard_uncertainty.map(Coordinate::from);
         }
     }
+}
+
+/// What its axes may need to be in position once the procedure has ended.
+fn settling(together: &Together, seats: &[Seat]) -> Duration {
+    let in_position = together.axes().map(|at| seats[at].in_position);
+    SETTLING + in_position.max().unwrap_or_default()
 }
 
 /// What a procedure has no use for.
