@@ -186,6 +186,29 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The device that it is about, where it is about a single one.
+    pub fn device(&self) -> Option<&str> {
+        match self {
+            Self::HeldUp { failure, .. } => failure.device(),
+            Self::Send { device, .. }
+            | Self::Alarm { device, .. }
+            | Self::Device { device, .. }
+            | Self::Overdue { device, .. }
+            | Self::NotStarted { device } => Some(device),
+            Self::Engine(_)
+            | Self::Link { .. }
+            | Self::BusOff { .. }
+            | Self::SecondMaster { .. }
+            | Self::Babbling { .. }
+            | Self::SoftLimit { .. }
+            | Self::NotZeroed { .. }
+            | Self::NoSuchAxis { .. }
+            | Self::NoSuchDevice { .. }
+            | Self::Interrupted
+            | Self::Terminated { .. } => None,
+        }
+    }
+
     /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus, 128 and the
     /// signal's number (130 for Ctrl-C, 143 for SIGTERM) when it was stopped on request.
     pub const fn exit_code(&self) -> u8 {

@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::platform::PlatformTeller;
 use crate::platform::motion::{PlatformMoved, PoseAsked};
 use crate::platform::target::parts;
-use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, PartMoved, Place, Teller};
+use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, PartMoved, Place, Teller};
 
 /// The screws of a platform move together, whether they are corrected or not.
 pub(super) static MOVES: GroupMoves = GroupMoves { judge, perform };
@@ -26,17 +26,27 @@ fn perform(
     store: &Store,
     asked: &GroupMove,
     teller: Option<&Teller>,
-) -> Result<GroupMoved, Failure> {
+) -> Result<GroupMoved, NotMoved> {
     let asked = PoseAsked::of(asked);
-    let mut platform = machine.platform()?;
-    platform.check_asked(store, &asked)?;
-    let before = platform.look_for(&asked)?;
+    let mut platform = machine.platform().map_err(NotMoved::Before)?;
+    let checked = platform.check_asked(store, &asked);
+    checked.map_err(NotMoved::Before)?;
+    let before = platform.look_for(&asked);
+    let before = before.map_err(|it| not_seen(&platform.config.camera, it))?;
     let moved = platform.move_asked(store, &asked, before)?;
     let words = teller.and_then(|it| it.of::<PlatformTeller>());
     Ok(GroupMoved {
         parts: parts_of(&moved),
         told: words.map(|it| (it.moved)(&moved)),
     })
+}
+
+/// A camera that sees nothing harms nobody before anything moves. What fails meanwhile may be a drive all the same.
+fn not_seen(camera: &str, failure: Failure) -> NotMoved {
+    match &failure {
+        Failure::Machine(it) if it.device() == Some(camera) => NotMoved::Before(failure),
+        _ => NotMoved::UnderWay(failure),
+    }
 }
 
 fn parts_of(moved: &PlatformMoved) -> Vec<PartMoved> {

@@ -7,7 +7,7 @@ use super::path::PathJudge;
 use super::person::Person;
 use super::task::{Found, Planned, Task, Work};
 use super::teller::Teller;
-use super::together::{GroupMove, GroupMoved, GroupMoves, Judge, Part};
+use super::together::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, Part};
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
@@ -200,21 +200,26 @@ impl Group {
         (self.moves()?.judge)(machine, store)
     }
 
-    /// Moves it as one.
+    /// Moves it as one, and says what that came to once anything may have been sent.
     ///
     /// # Errors
-    /// Those of the procedure.
+    /// What failed before anything was sent to an axis: all of them are as they were, and supervised. Those of the
+    /// procedure later are in what is returned.
     pub fn move_to(
         &self,
         machine: &mut Machine,
         store: &Store,
         asked: &GroupMove,
         teller: Option<&Teller>,
-    ) -> Result<GroupMoved, Failure> {
-        let mut moved = (self.moves()?.perform)(machine, store, asked, teller)?;
+    ) -> Result<Result<GroupMoved, Failure>, Failure> {
+        let mut moved = match (self.moves()?.perform)(machine, store, asked, teller) {
+            Ok(moved) => moved,
+            Err(NotMoved::Before(failure)) => return Err(failure),
+            Err(NotMoved::UnderWay(failure)) => return Ok(Err(failure)),
+        };
         if let (Some(told), Some(teller)) = (&mut moved.told, teller) {
             told.value["counters"] = (teller.counters)(machine);
         }
-        Ok(moved)
+        Ok(Ok(moved))
     }
 }

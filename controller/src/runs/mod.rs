@@ -22,4 +22,4 @@ pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]
 pub(crate) use teller::Words;
-pub(crate) use together::GroupMoves;
+pub(crate) use together::{GroupMoves, NotMoved};

@@ -97,6 +97,22 @@ pub struct GroupMoved {
     pub told: Option<Told>,
 }
 
+/// A move of a group that was not made to its end.
+#[derive(Debug)]
+pub(crate) enum NotMoved {
+    /// Nothing was sent to an axis: all of them are as they were, and supervised.
+    Before(Failure),
+    /// Its axes may have been sent something, or one of them failed.
+    UnderWay(Failure),
+}
+
+/// Whatever does not say that nothing was sent.
+impl From<Failure> for NotMoved {
+    fn from(failure: Failure) -> Self {
+        Self::UnderWay(failure)
+    }
+}
+
 type Judging = dyn Fn(&machine::Machine, &GroupMove) -> Result<(), Failure>;
 
 /// Says of a move of a group whether it can be made, as far as that can be told without asking a device.
@@ -131,5 +147,5 @@ pub(crate) struct GroupMoves {
     pub(crate) judge: fn(&mut Machine, &Store) -> Result<Judge, Failure>,
     /// Makes one, by the procedure that the verb uses.
     pub(crate) perform:
-        fn(&mut Machine, &Store, &GroupMove, Option<&Teller>) -> Result<GroupMoved, Failure>,
+        fn(&mut Machine, &Store, &GroupMove, Option<&Teller>) -> Result<GroupMoved, NotMoved>,
 }

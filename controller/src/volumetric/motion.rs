@@ -11,7 +11,7 @@ use units::Metres;
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::memories::Memory;
-use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, PartMoved, Place, Teller};
+use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, PartMoved, Place, Teller};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::moves::check_in;
 use crate::volumetric::path::PathFollowed;
@@ -211,20 +211,30 @@ fn judge(machine: &mut Machine, store: &Store) -> Result<Judge, Failure> {
     }))
 }
 
+/// What needs no device.
+fn prepare(
+    volume: &mut WorkVolume<'_>,
+    store: &Store,
+    asked: &GroupMove,
+) -> Result<(Ready, Point), Failure> {
+    let named = NamedPoint::of(&volume.config.axes, asked);
+    let target = named.from(volume.stands()?);
+    Ok((volume.ready(store, target)?, target))
+}
+
 fn perform(
     machine: &mut Machine,
     store: &Store,
     asked: &GroupMove,
     teller: Option<&Teller>,
-) -> Result<GroupMoved, Failure> {
-    let mut volume = machine.volumetric()?;
+) -> Result<GroupMoved, NotMoved> {
+    let mut volume = machine.volumetric().map_err(NotMoved::Before)?;
     let axes = volume.config().axes.clone();
-    let target = NamedPoint::of(&axes, asked).from(volume.stands()?);
-    let ready = volume.ready(store, target)?;
+    let (ready, target) = prepare(&mut volume, store, asked).map_err(NotMoved::Before)?;
     let live = volume.go_corrected(ready, target)?;
     let mut parts = Vec::new();
     for (k, axis) in axes.into_iter().enumerate() {
-        let reading = volume.core.reading(&axis)?;
+        let reading = volume.core.reading(&axis).map_err(Failure::from)?;
         let u = live.uncertainty[k];
         parts.push(PartMoved {
             target: Place::Length(live.nominal[k]),

@@ -1,5 +1,7 @@
 //! Motions of axes that move as one: procedures between two ticks.
 
+use truestage::Failure;
+
 use super::{Kept, is_stop, stops_the_machine};
 use crate::keeper::cause_of;
 
@@ -11,31 +13,41 @@ impl Kept {
         };
         let (machine, teller) = (&mut self.machine, self.teller.as_ref());
         let result = group.move_to(machine, &self.store, &asked, teller);
+        let (moved, not_moved) = match result {
+            Ok(Ok(moved)) => (Some(moved), None),
+            Ok(Err(failure)) => (None, Some((failure, Sent::Perhaps))),
+            Err(failure) => (None, Some((failure, Sent::Nothing))),
+        };
         let mut keeper = self.keeper.borrow_mut();
-        match result {
-            Ok(moved) => keeper.end_procedure_of(&self.machine, id, Some(moved)),
-            Err(failure) => {
-                keeper.end_procedure_of(&self.machine, id, None);
-                drop(keeper);
-                self.not_moved(id, failure);
-            }
+        keeper.end_procedure_of(&self.machine, id, moved);
+        drop(keeper);
+        if let Some((failure, sent)) = not_moved {
+            self.not_moved(id, failure, sent);
         }
     }
 
-    fn not_moved(&mut self, id: &str, failure: truestage::Failure) {
-        match failure {
+    fn not_moved(&mut self, id: &str, failure: Failure, sent: Sent) {
+        if self.machine.stop_request().is_requested() {
             // The next tick ends the service.
-            _ if self.machine.stop_request().is_requested() => {}
-            failure if is_stop(&failure) => {
-                let mut keeper = self.keeper.borrow_mut();
-                keeper.motion_interrupted(&mut self.machine, id);
-            }
-            failure if stops_the_machine(&failure) => self.failed(failure),
-            failure => {
-                let cause = cause_of(&failure);
-                let mut keeper = self.keeper.borrow_mut();
-                keeper.motion_refused(&mut self.machine, id, cause);
-            }
+            return;
+        }
+        if is_stop(&failure) {
+            let mut keeper = self.keeper.borrow_mut();
+            keeper.motion_interrupted(&mut self.machine, id);
+        } else if sent == Sent::Perhaps && stops_the_machine(&failure) {
+            self.failed(failure);
+        } else {
+            let cause = cause_of(&failure);
+            let mut keeper = self.keeper.borrow_mut();
+            keeper.motion_refused(&mut self.machine, id, cause);
         }
     }
+}
+
+/// What a motion that failed had sent to its axes: where it is nothing, they stand and are supervised, whatever the
+/// cause.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sent {
+    Nothing,
+    Perhaps,
 }

@@ -163,7 +163,23 @@ fn a_platform_is_sent_to_poses_and_what_cannot_be_is_refused_before_it_moves() {
         // What nobody names stays where the camera sees it.
         let view = bed.done(&to("y", 0.4));
         assert!((at(&view, "x") - 0.5).abs() < 0.02 && (at(&view, "y") - 0.4).abs() < 0.02);
+        is_not_sent_where_the_camera_sees_nothing(bed);
     });
+}
+
+/// It has to look where the parts are that nobody names, before anything is sent: nothing is lost.
+fn is_not_sent_where_the_camera_sees_nothing(bed: &Bed<'_>) {
+    let here = bed.screws_mm();
+    let absent = bed.stage.inject(Fault::TargetAbsent);
+    let view = bed.ended(&bed.begin(&to("y", 0.3)));
+    assert_eq!(view.state, MotionState::Failed, "{view:?}");
+    let cause = view.cause.expect("it failed");
+    assert!(cause.cause.contains("no target"), "{cause:?}");
+    assert_eq!(bed.screws_mm(), here);
+    assert_eq!(bed.client.machine().state, MachineState::Running);
+    bed.stage.end_fault(absent);
+    let view = bed.done(&to("y", 0.3));
+    assert!((at(&view, "y") - 0.3).abs() < 0.02, "{view:?}");
 }
 
 #[test]
