@@ -97,6 +97,10 @@ impl Seat {
             (true, None) => self.standing_since = Some(sampled.at),
             (true, Some(_)) => {}
         }
+        // Nothing holds it there any more: whoever pushes it need not make its drive say so.
+        if !self.is_enabled(machine) {
+            self.rests_at = None;
+        }
     }
 
     /// Whether it has been in position for its time.

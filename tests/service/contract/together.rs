@@ -299,6 +299,7 @@ fn off_um(bed: &Bed<'_>, mm: [f64; 3]) -> [f64; 3] {
 fn three_axes_that_are_corrected_together_move_as_one_and_follow_paths() {
     with_known_volume(|bed| {
         moves_as_one(bed);
+        forgets_where_an_axis_rests_that_is_switched_off(bed);
         follows_paths(bed);
     });
 }
@@ -378,7 +379,17 @@ fn moves_as_one(bed: &Bed<'_>) {
     assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
 }
 
-fn path(rows: &str) -> RunRequest {
+/// Where nothing holds an axis, nobody knows by a move where it is.
+fn forgets_where_an_axis_rests_that_is_switched_off(bed: &Bed<'_>) {
+    assert!(bed.client.axis("x").unwrap().corrected);
+    for on in [false, true] {
+        bed.client.power(&anna(), "x", on).unwrap();
+        bed.let_time_pass(0.05);
+        assert!(!bed.client.axis("x").unwrap().corrected, "on: {on}");
+    }
+}
+
+pub(super) fn path(rows: &str) -> RunRequest {
     RunRequest {
         path: Some(format!("time_s,x_mm,y_mm,z_mm\n{rows}")),
         start: false,
