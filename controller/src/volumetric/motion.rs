@@ -17,7 +17,8 @@ use crate::volumetric::moves::check_in;
 use crate::volumetric::path::PathFollowed;
 use crate::volumetric::settings::work_volume;
 use crate::volumetric::{
-    GEOMETRY, Mover, VolumetricCorrection, VolumetricFailure, VolumetricRecords, VolumetricTeller,
+    GEOMETRY, Mover, VolumetricCorrection, VolumetricFailure, VolumetricRecords, VolumetricState,
+    VolumetricTeller,
 };
 
 /// How long the tool is seen to stand at its target.
@@ -82,15 +83,29 @@ impl WorkVolume<'_> {
     /// # Errors
     /// When nothing was measured, what is stored cannot be applied, or the target is outside.
     pub(crate) fn ready(&mut self, store: &Store, target: Point) -> Result<Ready, Failure> {
-        let mut ready = self.corrected_loop(store)?;
+        let stored = self.state(store)?.ok_or_else(never_measured)?;
+        // A target that is refused must not cost the loop that is kept.
+        if let Some((kept, _)) = &mut self.last().0 {
+            kept.mover.check_target(target)?;
+            self.check(target)?;
+        }
+        let mut ready = self.loop_of(stored)?;
         ready.mover.check_target(target)?;
         self.check(target)?;
         Ok(ready)
     }
 
-    /// The loop that all that is stored corrects: the last one, while that is what it knows.
+    /// The loop that all that is stored corrects.
     fn corrected_loop(&mut self, store: &Store) -> Result<Ready, Failure> {
-        let (state, records) = self.state(store)?.ok_or_else(never_measured)?;
+        let stored = self.state(store)?.ok_or_else(never_measured)?;
+        self.loop_of(stored)
+    }
+
+    /// The loop that this corrects: the last one, while that is what it knows.
+    fn loop_of(
+        &mut self,
+        (state, records): (VolumetricState, VolumetricRecords),
+    ) -> Result<Ready, Failure> {
         let last = self.last().0.take().map(|it| it.0);
         let last = last.filter(|it| it.records == records);
         if let Some(last) = last {
