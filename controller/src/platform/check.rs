@@ -6,7 +6,7 @@ use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::platform::config::{PlatformCalibrateConfig, PlatformConfig, StrokesConfig};
+use crate::platform::config::{PARTS, PlatformCalibrateConfig, PlatformConfig, StrokesConfig};
 use crate::platform::kinematics;
 
 pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -15,6 +15,7 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     };
     check_inconsistency(&mut Judge::at("platform".into(), findings), platform);
     check_references(findings, config, platform);
+    check_names(findings, config);
     if let Some(run) = &platform.calibrate {
         let judge = &mut Judge::at("platform.calibrate".into(), findings);
         check_calibrate(judge, platform, run);
@@ -106,6 +107,25 @@ fn check_references(
                 axis.motion.speed_max_mm_per_s,
             );
         }
+    }
+}
+
+/// Targets go by name: whoever asks for a part of the pose would be given the axis that is called like it.
+fn check_names(findings: &mut Vec<Finding>, config: &MachineConfig) {
+    let axes = config.axis.keys().map(|it| ("axis", it));
+    let tables = config.rotary.keys().map(|it| ("rotary", it));
+    let taken = axes
+        .chain(tables)
+        .filter(|it| PARTS.contains(&it.1.as_str()));
+    for (section, name) in taken {
+        Judge::at(section.into(), findings).say(
+            name,
+            format!("`{name}` is a part of the platform's pose, and an axis is called so, too"),
+            format!(
+                "call the axis otherwise; {} are the platform's",
+                PARTS.join(", ")
+            ),
+        );
     }
 }
 

@@ -4,6 +4,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use units::Metres;
 
+/// What a pose is made of, as targets are named.
+pub(crate) const PARTS: [&str; 3] = ["x", "y", "theta"];
+
 /// An alignment platform on screws (system S1).
 ///
 /// Three or four axes that move one body in x, y and angle. Its cycle is that of the verbs `zero`,

@@ -3,10 +3,8 @@
 use compensator::platform::Pose;
 use units::{Metres, Radians};
 
+use crate::platform::config::PARTS;
 use crate::runs::{GroupMove, Part};
-
-/// What a pose is made of, as targets are named.
-pub(crate) const PARTS: [&str; 3] = ["x", "y", "theta"];
 
 /// The same, with what each is.
 pub(super) fn parts() -> Vec<Part> {

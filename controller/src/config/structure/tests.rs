@@ -125,6 +125,20 @@ fn a_list_of_another_length_and_a_section_of_a_list_are_found_where_they_stand()
 }
 
 #[test]
+fn an_axis_beside_a_platform_is_not_called_like_a_part_of_its_pose() {
+    let text = UVW
+        .edit("[axis.w", "[axis.y")
+        .edit("axis = \"w\"", "axis = \"y\"");
+    let found = findings(&text);
+    let [one] = &found[..] else {
+        panic!("{found:#?}")
+    };
+    assert_eq!(one.key, "axis.y");
+    assert!(one.cause.contains("part of the platform's pose"), "{one}");
+    assert!(one.help.contains("x, y, theta"), "{one}");
+}
+
+#[test]
 fn a_section_that_is_missing_is_named() {
     let begin = UVW.find("[platform.zero]").expect("it is there");
     let end = begin + UVW[begin + 1..].find("\n[").expect("another follows") + 1;
