@@ -5,6 +5,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use machine::engine::CsvPath;
+use machine::records::Store;
 use units::Metres;
 
 use crate::failure::Failure;
@@ -40,24 +41,29 @@ impl JudgedPath {
     }
 }
 
-type Judging = dyn Fn(&str, bool) -> Result<JudgedPath, Failure> + Send;
+type Judging = dyn Fn(&Store, &str, bool) -> Result<JudgedPath, Failure> + Send;
 
 /// Judges paths, on whatever thread that is done: long ones take seconds.
 pub struct PathJudge(Box<Judging>);
 
 impl PathJudge {
     pub(crate) fn new(
-        judging: impl Fn(&str, bool) -> Result<JudgedPath, Failure> + Send + 'static,
+        judging: impl Fn(&Store, &str, bool) -> Result<JudgedPath, Failure> + Send + 'static,
     ) -> Self {
         Self(Box::new(judging))
     }
 
-    /// Judges the path with these `rows`, point by point as it will be driven, corrected or not.
+    /// Judges the path with these `rows`, point by point as it will be driven, corrected by what is in `store` or not.
     ///
     /// # Errors
-    /// The first row and column that cannot be read, or the first point that cannot be driven.
-    pub fn judge(&self, rows: &str, is_corrected: bool) -> Result<JudgedPath, Failure> {
-        (self.0)(rows, is_corrected)
+    /// It is to be corrected, and nothing was measured; the first row and column that cannot be read, or the first point that cannot be driven.
+    pub fn judge(
+        &self,
+        store: &Store,
+        rows: &str,
+        is_corrected: bool,
+    ) -> Result<JudgedPath, Failure> {
+        (self.0)(store, rows, is_corrected)
     }
 }
 

@@ -169,8 +169,19 @@ impl WorkVolume<'_> {
     }
 }
 
+/// Refuses what is to be corrected where nothing was measured.
+///
+/// # Errors
+/// Nothing was, or the store cannot be read.
+pub(crate) fn require_measured(store: &Store) -> Result<(), Failure> {
+    match store.active(GEOMETRY)?.current {
+        Some(_) => Ok(()),
+        None => Err(never_measured()),
+    }
+}
+
 /// Three axes that nothing corrects.
-pub(crate) fn never_measured() -> Failure {
+fn never_measured() -> Failure {
     Failure::NotCalibrated {
         what: "the errors of x, y and z were never measured".into(),
     }

@@ -15,7 +15,7 @@ use crate::runs::{
 use crate::volumetric::asked::Asking;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::handle::WorkVolume;
-use crate::volumetric::motion::MOVES;
+use crate::volumetric::motion::{MOVES, require_measured};
 use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricTeller, WarmUp};
 
 /// What the three axes are called together.
@@ -123,7 +123,10 @@ const PATH: &str = "path";
 
 fn paths(machine: &mut Machine) -> Result<PathJudge, Failure> {
     let judge = machine.volumetric()?.path_judge()?;
-    Ok(PathJudge::new(move |rows, is_corrected| {
+    Ok(PathJudge::new(move |store, rows, is_corrected| {
+        if is_corrected {
+            require_measured(store)?;
+        }
         let path = judge.judge((Path::new(PATH), rows), is_corrected)?;
         Ok(JudgedPath::new(path, judge.period()))
     }))

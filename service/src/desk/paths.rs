@@ -41,7 +41,7 @@ impl Desk {
             Problem::new(Code::NotOffered, what, "three axes of a volume do")
         })?;
         let judge = judge.lock().unwrap_or_else(PoisonError::into_inner);
-        let judged = judge.judge(rows, !request.uncompensated);
+        let judged = judge.judge(&self.shared.store, rows, !request.uncompensated);
         judged.map(Some).map_err(|failure| {
             let problem = Problem::from(&failure);
             match failure {

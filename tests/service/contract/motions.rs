@@ -4,6 +4,7 @@ use mock_bus::fault::Fault;
 use service::{AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest, StopMode};
 use tests::{Edit, LINEAR};
 
+use super::together::path;
 use super::{
     Bed, SEED, anna, bert, compensated, each, length, slowly, to, with_stage, with_three_axes,
     with_zeroed_stage, with_zeroed_stage_in_process,
@@ -335,6 +336,9 @@ fn motions_of_disjoint_axes_overlap() {
         };
         bed.refused(&refused, Code::NotOffered);
         bed.refused(&compensated("x", 2.0), Code::Calibration);
+        let corrected = path("0,1,1,1\n1,2,1,1\n");
+        let problem = bed.client.plan(&anna(), &corrected).unwrap_err();
+        assert_eq!(problem.code, Code::Calibration, "{problem:?}");
         let first = bed.begin(&of(&[("x", 2.0)]));
         let second = bed.begin(&of(&[("y", 1.0), ("z", 1.0)]));
         bed.refused(&of(&[("x", 3.0), ("y", 3.0)]), Code::AxisBusy);

@@ -10,7 +10,7 @@ use crate::program::intended::{Intent, Step, calibration, nowhere};
 use crate::program::volumetric::verbs::{targets, warm_up_of};
 use crate::program::{CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::calibrate::plan::volume_plan;
-use crate::volumetric::motion::never_measured;
+use crate::volumetric::motion::require_measured;
 use crate::volumetric::{GEOMETRY, VolumeAxisName, VolumetricConfig, VolumetricFailure};
 
 /// What all three axes are called together.
@@ -138,8 +138,8 @@ fn moved(
     args: &MoveArgs,
 ) -> Result<Step, Failure> {
     let compensated = !args.agreed.uncompensated;
-    if compensated && store.active(GEOMETRY)?.current.is_none() {
-        return Err(never_measured());
+    if compensated {
+        require_measured(store)?;
     }
     let target = targets(args)?.from(volume.zero.index_mm.map(Metres::from_mm));
     let mut machine = nowhere::machine(loaded);

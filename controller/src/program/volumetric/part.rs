@@ -22,9 +22,9 @@ use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
 use crate::runs::Told;
 use crate::volumetric::MemoryName;
 use crate::volumetric::first_part::FirstPart;
-use crate::volumetric::motion::never_measured;
+use crate::volumetric::motion::require_measured;
 use crate::volumetric::path::{CorrectedPath, PathFollowed};
-use crate::volumetric::{GEOMETRY, Mover, Remembered, import, memory_pointer};
+use crate::volumetric::{Mover, Remembered, import, memory_pointer};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -43,9 +43,8 @@ pub(crate) fn run(
 ) -> Ended {
     let path = read(file)?;
     let mut session = Session::open(args, "run", Use::Motion, output)?;
-    let is_measured = session.store.active(GEOMETRY)?.current.is_some();
-    if !is_measured && !uncompensated {
-        return Err(never_measured());
+    if !uncompensated {
+        require_measured(&session.store)?;
     }
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
     let judge = session.machine.volumetric()?.path_judge()?;
@@ -112,8 +111,8 @@ pub(crate) fn only_judged(
     let text = read(file)?;
     let loaded = config::load(&args.config)?;
     let store = loaded.config.machine.store();
-    if is_corrected && store.active(GEOMETRY)?.current.is_none() {
-        return Err(never_measured());
+    if is_corrected {
+        require_measured(&store)?;
     }
     let judge = nowhere::machine(&loaded).volumetric()?.path_judge()?;
     let path = judge.judge((file, &text), is_corrected)?;
