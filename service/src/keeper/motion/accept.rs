@@ -144,16 +144,25 @@ impl Keeper {
                         self.require_free(at)?;
                     }
                 }
+                if motion.together.is_some() && !self.supersedes_a_procedure(motion) {
+                    self.require_no_run()?;
+                }
                 self.supersede(machine, motion);
                 Ok(())
             }
         }
     }
 
+    /// Whether the procedure that has the machine is that of a motion that the new one stops.
+    fn supersedes_a_procedure(&self, motion: &Motion) -> bool {
+        let mut active = self.motions.active.iter();
+        active.any(|it| it.has_procedure() && shares_an_axis(it, motion))
+    }
+
     /// Another motion may wait for an axis that is free.
     pub(super) fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
         let mut others = self.motions.active.iter();
-        let other = others.find(|it| it.axes().any(|at| motion.axes().any(|own| own == at)));
+        let other = others.find(|it| shares_an_axis(it, motion));
         other.map_or(Ok(()), |other| {
             Err(Problem::new(
                 Code::AxisBusy,
@@ -168,13 +177,18 @@ impl Keeper {
     fn supersede(&mut self, machine: &mut Machine, motion: &Motion) {
         for number in 0..self.motions.active.len() {
             let other = &self.motions.active[number];
-            if other.axes().any(|at| motion.axes().any(|own| own == at)) {
+            if shares_an_axis(other, motion) {
                 let by = format!("{} (superseded by {})", motion.by, motion.id);
                 let stopped = stopped_by(by);
                 self.stop_motion(machine, number, End::Stopped(stopped));
             }
         }
     }
+}
+
+fn shares_an_axis(other: &Motion, motion: &Motion) -> bool {
+    let mut axes = other.axes();
+    axes.any(|at| motion.axes().any(|own| own == at))
 }
 
 fn dead_man_of(request: &MoveRequest) -> Result<Option<Duration>, Problem> {
