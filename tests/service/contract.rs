@@ -82,18 +82,20 @@ fn each_of(meetings: Vec<(Rig, Meet)>, new: impl Fn(Rig, &Path) -> Stage, body: 
 
 /// A linear stage that has its zero, on each interface.
 fn with_zeroed_stage(body: impl Fn(&Bed<'_>)) {
-    with_stage(|bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    with_stage(zeroed(body));
 }
 
 /// The same where no bus is: for what is told alike on any.
 fn with_zeroed_stage_in_process(body: impl Fn(&Bed<'_>)) {
-    each_here(linear, |bed| {
+    each_here(linear, zeroed(body));
+}
+
+/// First its zero, then the rest.
+fn zeroed(body: impl Fn(&Bed<'_>)) -> impl Fn(&Bed<'_>) {
+    move |bed| {
         bed.client.zero(&anna(), None);
         body(bed);
-    });
+    }
 }
 
 fn linear(rig: Rig, folder: &Path) -> Stage {
@@ -108,10 +110,7 @@ fn with_stage(body: impl Fn(&Bed<'_>)) {
 /// Three axes that have their zero, on each interface.
 fn with_three_axes(body: impl Fn(&Bed<'_>)) {
     let new = |rig, folder: &Path| Stage::new(rig, (VOLUMETRIC, SEED), folder, |text| text);
-    each(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each(new, zeroed(body));
 }
 
 fn anna() -> Caller {

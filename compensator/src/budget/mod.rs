@@ -115,6 +115,26 @@ pub struct Contribution {
 }
 
 impl Contribution {
+    /// Of this standard uncertainty in its unit, with a sensitivity of 1 and infinitely many degrees of freedom, for
+    /// both approaches.
+    pub fn new(
+        name: &str,
+        evaluation: Evaluation,
+        (value, unit): (f64, &str),
+        correlation: Correlation,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            evaluation,
+            value,
+            unit: unit.to_owned(),
+            sensitivity: 1.0,
+            degrees_of_freedom: None,
+            correlation,
+            approach: None,
+        }
+    }
+
     /// Its share of the standard uncertainty at a calibrated position so far from the datum, or
     /// half-way between two for [`Correlation::BetweenPositions`].
     pub fn share(&self, distance: Metres) -> Metres {

@@ -202,16 +202,8 @@ fn sides(fitted: &Fitted) -> [(Approach, Option<Metres>, Repeats); 2] {
 }
 
 fn offset(name: &str, evaluation: Evaluation, value: Metres) -> Contribution {
-    Contribution {
-        name: name.to_owned(),
-        evaluation,
-        value: value.value(),
-        unit: "m".to_owned(),
-        sensitivity: 1.0,
-        degrees_of_freedom: None,
-        correlation: Correlation::CommonOffset,
-        approach: None,
-    }
+    let length = (value.value(), "m");
+    Contribution::new(name, evaluation, length, Correlation::CommonOffset)
 }
 
 fn freedom(count: usize) -> Option<f64> {

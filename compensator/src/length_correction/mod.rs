@@ -371,15 +371,10 @@ fn air_lines(
 /// An input that stretches every length: so many metres per metre for one of its units.
 fn scale(source: Source, value: f64, sensitivity: f64) -> (Source, budget::Contribution) {
     let (name, unit) = source.name();
+    let input = (value, unit);
     let line = budget::Contribution {
-        name: name.to_owned(),
-        evaluation: Evaluation::B,
-        value,
-        unit: unit.to_owned(),
         sensitivity,
-        degrees_of_freedom: None,
-        correlation: Correlation::CommonScale,
-        approach: None,
+        ..budget::Contribution::new(name, Evaluation::B, input, Correlation::CommonScale)
     };
     (source, line)
 }

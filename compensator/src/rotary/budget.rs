@@ -68,15 +68,10 @@ impl Solution {
                 (None, Some(given)) => (GIVEN, Evaluation::B, given, None),
                 (None, None) => return None,
             };
+        let noise = (value.value(), "rad");
         Some(Contribution {
-            name: name.to_owned(),
-            evaluation,
-            value: value.value(),
-            unit: "rad".to_owned(),
-            sensitivity: 1.0,
             degrees_of_freedom,
-            correlation: Correlation::SharedReadings,
-            approach: None,
+            ..Contribution::new(name, evaluation, noise, Correlation::SharedReadings)
         })
     }
 

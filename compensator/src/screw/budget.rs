@@ -81,14 +81,8 @@ fn line(
     correlation: Correlation,
 ) -> Contribution {
     Contribution {
-        name: name.to_owned(),
-        evaluation: Evaluation::A,
-        value: scatter.value(),
-        unit: "m".to_owned(),
-        sensitivity: 1.0,
         degrees_of_freedom: Some(degrees_of_freedom.max(1) as f64),
-        correlation,
-        approach: None,
+        ..Contribution::new(name, Evaluation::A, (scatter.value(), "m"), correlation)
     }
 }
 

@@ -150,20 +150,13 @@ pub(crate) fn left_out(
 }
 
 fn uncorrected(name: &str, per_metre: Metres, correlation: Correlation) -> Contribution {
-    Contribution {
-        name: format!("{name}, not corrected"),
-        evaluation: Evaluation::B,
-        value: per_metre.abs().value(),
-        unit: match correlation {
-            Correlation::CommonScale => "m/m",
-            _ => "m",
-        }
-        .to_owned(),
-        sensitivity: 1.0,
-        degrees_of_freedom: None,
-        correlation,
-        approach: None,
-    }
+    let name = format!("{name}, not corrected");
+    let unit = match correlation {
+        Correlation::CommonScale => "m/m",
+        _ => "m",
+    };
+    let left_out = (per_metre.abs().value(), unit);
+    Contribution::new(&name, Evaluation::B, left_out, correlation)
 }
 
 #[cfg(test)]

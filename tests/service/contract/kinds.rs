@@ -8,7 +8,7 @@ use tests::volume::quick;
 use tests::{Edit, Rig, UVW, VOLUMETRIC};
 use units::Metres;
 
-use super::{Bed, SEED, anna, bert, compensated, each, to};
+use super::{Bed, SEED, anna, bert, compensated, each, to, zeroed};
 use crate::client::{InProcess, PATIENCE};
 use crate::stage::Stage;
 
@@ -100,10 +100,7 @@ fn short_line(text: String) -> String {
 
 fn with_volume(body: impl Fn(&Bed<'_>)) {
     let new = |rig, folder: &Path| Stage::new(rig, (VOLUMETRIC, SEED), folder, short_line);
-    each(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each(new, zeroed(body));
 }
 
 fn as_found() -> RunRequest {

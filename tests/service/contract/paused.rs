@@ -6,7 +6,7 @@ use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, RunVi
 use tests::LINEAR;
 
 use super::runs::short;
-use super::{Bed, SEED, anna, bert, each, meetings, to};
+use super::{Bed, SEED, anna, bert, each, meetings, to, zeroed};
 use crate::client::PATIENCE;
 use crate::stage::Stage;
 
@@ -45,10 +45,7 @@ impl Bed<'_> {
 
 fn with_short_runs(body: impl Fn(&Bed<'_>)) {
     let new = |rig, folder: &std::path::Path| Stage::new(rig, (LINEAR, SEED), folder, short);
-    each(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each(new, zeroed(body));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use tests::volume::{Volume, good, quick};
 use tests::{Edit, UVW, VOLUMETRIC};
 use units::{Metres, Radians};
 
-use super::{Bed, SEED, anna, bert, compensated, each, each_here, length, to};
+use super::{Bed, SEED, anna, bert, compensated, each, each_here, length, to, zeroed};
 use crate::client::PATIENCE;
 use crate::stage::Stage;
 
@@ -34,10 +34,7 @@ fn with_slow_platform(body: impl Fn(&Bed<'_>)) {
 
 fn with_platform_of(change: fn(String) -> String, body: impl Fn(&Bed<'_>)) {
     let new = |rig, folder: &Path| Stage::new(rig, (UVW, SEED), folder, change);
-    each(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each(new, zeroed(body));
 }
 
 fn pose(x_mm: f64, y_mm: f64, arcsec: f64) -> MoveRequest {
@@ -276,10 +273,7 @@ fn with_known_volume(body: impl Fn(&Bed<'_>)) {
         before.bequeath(&folder.join("volumetric"));
         Stage::new(rig, (VOLUMETRIC, SEED), folder, quick)
     };
-    each_here(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each_here(new, zeroed(body));
 }
 
 /// By how much the tool is off where the axes are to be, in µm.

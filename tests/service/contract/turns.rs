@@ -7,7 +7,7 @@ use tests::ROTARY;
 use units::Radians;
 
 use super::questions::{Hand, few_placements};
-use super::{Bed, SEED, anna, bert, each, to};
+use super::{Bed, SEED, anna, bert, each, to, zeroed};
 use crate::stage::Stage;
 
 fn turned(degrees: f64) -> MoveRequest {
@@ -24,10 +24,7 @@ fn corrected(degrees: f64) -> MoveRequest {
 fn with_table(body: impl Fn(&Bed<'_>)) {
     let new =
         |rig, folder: &std::path::Path| Stage::new(rig, (ROTARY, SEED), folder, few_placements);
-    each(new, |bed| {
-        bed.client.zero(&anna(), None);
-        body(bed);
-    });
+    each(new, zeroed(body));
 }
 
 impl Bed<'_> {

@@ -177,7 +177,7 @@ impl Parts {
                 .into_iter()
                 .all(|it| matches!(it, Reading::Angle { .. }));
             let unit = if is_angle { "rad" } else { "m" };
-            line(
+            Contribution::new(
                 name,
                 Evaluation::B,
                 (rms(&u), unit),
@@ -186,7 +186,7 @@ impl Parts {
         });
         let freedom = Some(self.fit.degrees_of_freedom as f64).filter(|it| *it > 0.0);
         let shared = |name, at: usize, correlation| {
-            line(name, Evaluation::B, (most(first + at), "m"), correlation)
+            Contribution::new(name, Evaluation::B, (most(first + at), "m"), correlation)
         };
         let beyond = Contribution {
             evaluation: Evaluation::A,
@@ -197,7 +197,7 @@ impl Parts {
         let others = [
             shared(WHERE_READ, 0, Correlation::SharedReadings),
             beyond,
-            line(
+            Contribution::new(
                 THERMOMETERS,
                 Evaluation::B,
                 heat,
@@ -206,24 +206,6 @@ impl Parts {
             shared(BETWEEN, 3, Correlation::BetweenPositions),
         ];
         of_readings.chain(others).collect()
-    }
-}
-
-fn line(
-    name: &str,
-    evaluation: Evaluation,
-    (value, unit): (f64, &str),
-    correlation: Correlation,
-) -> Contribution {
-    Contribution {
-        name: name.to_owned(),
-        evaluation,
-        value,
-        unit: unit.to_owned(),
-        sensitivity: 1.0,
-        degrees_of_freedom: None,
-        correlation,
-        approach: None,
     }
 }
 
