@@ -21,7 +21,7 @@ use truestage::Failure;
 use crate::figures::Figures;
 use crate::keeper::utc_now;
 use crate::ledger::{Asked, Ledger, LedgerError};
-use crate::order::{Answer, Answered, Letter, Order};
+use crate::order::{Answer, Answered, Letter, Order, Reply};
 use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
@@ -48,6 +48,8 @@ struct Shared {
     page: Option<Page>,
     /// Who judges paths, by what follows them.
     paths: PathJudges,
+    /// As many copies as orders are unanswered, and this one.
+    unanswered: Arc<()>,
 }
 
 /// Makes a page of a journal.
@@ -89,6 +91,7 @@ impl Desk {
             store,
             page,
             paths,
+            unanswered: Arc::default(),
         };
         Self {
             letters,
@@ -98,7 +101,7 @@ impl Desk {
 
     /// Gives an order; never waits.
     pub(crate) fn give(&self, caller: &Caller, order: Order) -> Result<Pending, Problem> {
-        let (reply, answer) = oneshot::channel();
+        let (reply, answer) = Reply::new(&self.shared.unanswered);
         let letter = Letter {
             order,
             caller: caller.clone(),
@@ -113,6 +116,11 @@ impl Desk {
             )),
             Err(TrySendError::Disconnected(_)) => Err(ended()),
         }
+    }
+
+    /// How many orders were given and have no answer yet.
+    pub fn unanswered(&self) -> usize {
+        Arc::strong_count(&self.shared.unanswered) - 1
     }
 
     fn done(&self, caller: &Caller, order: Order) -> Result<(), Problem> {

@@ -1,5 +1,7 @@
 //! What goes to the machine's thread, and what comes back.
 
+use std::sync::Arc;
+
 use tokio::sync::oneshot;
 use truestage::runs::JudgedPath;
 
@@ -109,8 +111,29 @@ pub(crate) enum Answer {
 /// Whether it is carried out.
 pub(crate) type Answered = Result<Answer, Problem>;
 
-/// The place for an answer; whoever asked may have gone.
-pub(crate) type Reply = oneshot::Sender<Answered>;
+/// The place for an answer; while it is there, the order counts as unanswered.
+#[derive(Debug)]
+pub(crate) struct Reply {
+    sender: oneshot::Sender<Answered>,
+    _unanswered: Arc<()>,
+}
+
+impl Reply {
+    /// One of those that share `unanswered`, and where its answer comes.
+    pub(crate) fn new(unanswered: &Arc<()>) -> (Self, oneshot::Receiver<Answered>) {
+        let (sender, answer) = oneshot::channel();
+        let reply = Self {
+            sender,
+            _unanswered: Arc::clone(unanswered),
+        };
+        (reply, answer)
+    }
+
+    /// Whoever asked may have gone: that is no reason to do anything else.
+    pub(crate) fn send(self, answered: Answered) {
+        let _ = self.sender.send(answered);
+    }
+}
 
 /// An order on its way.
 #[derive(Debug)]

@@ -20,9 +20,7 @@ use truestage::{Failure, Machine, groups};
 use wire::cia402::PowerState;
 
 use crate::desk::{Desk, Page, PathJudges};
-use crate::keeper::{
-    Attending, Job, Keeper, Mechanics, Mode, RunTask, answer, cause_of, fixed, seats,
-};
+use crate::keeper::{Attending, Job, Keeper, Mechanics, Mode, RunTask, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
 use crate::manager::{Manager, Watch};
 use crate::order::{Answer, Choice, Letter, Reply};
@@ -233,11 +231,11 @@ impl Kept {
                 Some(Job::Move(id)) => self.move_as_one(&id),
                 Some(Job::Choose(choice, by, reply)) => {
                     let chosen = self.choose(&choice, &by);
-                    answer(reply, chosen);
+                    reply.send(chosen);
                 }
                 Some(Job::Reset(reply)) => {
                     let reset = self.reset();
-                    answer(reply, reset);
+                    reply.send(reset);
                 }
                 Some(Job::End(reply)) => return self.end_for(reply),
             }
@@ -260,7 +258,7 @@ impl Kept {
 
     fn end_for(&mut self, reply: Reply) -> Result<(), Failure> {
         let ended = self.end("whoever ended the service");
-        answer(reply, Ok(Answer::Done));
+        reply.send(Ok(Answer::Done));
         ended
     }
 

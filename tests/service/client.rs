@@ -12,7 +12,7 @@ use service::{
 use crate::stage::{Gate, Stage};
 
 /// The longest that a test waits for an end, by the clock on the wall.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(280);
 
 /// Somebody who asks the service.
 pub(crate) trait Client {

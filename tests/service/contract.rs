@@ -187,12 +187,9 @@ impl Bed<'_> {
         view.encoder.expect("it was read").value
     }
 
-    /// Lets `seconds` pass by the machine's clock: each question does a little.
+    /// Lets `seconds` pass by the machine's clock.
     fn let_time_pass(&self, seconds: f64) {
-        let until = self.client.machine().clock_s + seconds;
-        while self.client.machine().clock_s < until {
-            self.stage.simulation(|_| ());
-        }
+        self.stage.gate.let_pass(Duration::from_secs_f64(seconds));
     }
 }
 

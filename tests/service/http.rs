@@ -102,6 +102,7 @@ impl Http {
         let _passing = self.gate.pass_for(wait);
         let mut bytes = Vec::new();
         let mut stream = self.send(head, body);
+        stream.set_read_timeout(Some(wait + LATE)).expect("a time");
         stream.read_to_end(&mut bytes).expect("an answer");
         let end = bytes
             .windows(4)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use core::time::Duration;
 
@@ -17,13 +17,15 @@ use truestage::{Failure, Machine, ports};
 use units::Time;
 use wire::{Arrival, Payload, Port, Ports};
 
+use crate::client::PATIENCE;
+
 /// So much passes at most for a request that does not wait: nothing that ends by itself within it is asked of a
 /// service here, and a drive is switched on within a few of them.
 const ALLOWANCE: Duration = Duration::from_millis(50);
-/// While a request is on its way and its time is used up, a tick passes each time: the wall has to go on for a
-/// second before a dead-man of 200 ms strikes.
-const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// While an order has no answer and its time is used up, a tick passes each time: it is taken at the end of one.
 const TRICKLE: Duration = Duration::from_millis(2);
+/// How often it is looked whether there is such an order; no time of the machine passes by looking.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
 
 /// Time passes while it is open. How much passes for a request is counted by the machine's clock: a computer that
 /// holds up the one who asked does not let the machine run on meanwhile.
@@ -31,6 +33,10 @@ const TRICKLE: Duration = Duration::from_millis(2);
 pub(crate) struct Gate {
     doors: Mutex<Doors>,
     opened: Condvar,
+    /// So much has passed as somebody wanted to pass.
+    passed: Condvar,
+    /// Who knows how many orders have no answer.
+    desk: OnceLock<Desk>,
 }
 
 #[derive(Debug)]
@@ -45,6 +51,10 @@ struct Doors {
     is_fresh: bool,
     /// When the allowance is used up.
     until: Option<Time>,
+    /// So much time is to pass, whoever asks meanwhile.
+    wanted: Option<Duration>,
+    /// When it has.
+    wanted_until: Option<Time>,
 }
 
 impl Default for Doors {
@@ -55,6 +65,8 @@ impl Default for Doors {
             allowance: ALLOWANCE,
             is_fresh: false,
             until: None,
+            wanted: None,
+            wanted_until: None,
         }
     }
 }
@@ -65,8 +77,20 @@ impl Doors {
         if core::mem::take(&mut self.is_fresh) {
             self.until = Some(now + self.allowance);
         }
-        let is_within = self.until.is_some_and(|until| now < until);
-        self.open > 0 && (self.waiting > 0 || is_within)
+        if let Some(wanted) = self.wanted.take() {
+            self.wanted_until = Some(now + wanted);
+        }
+        let is_before = |until: Option<Time>| until.is_some_and(|until| now < until);
+        is_before(self.wanted_until) || self.open > 0 && (self.waiting > 0 || is_before(self.until))
+    }
+
+    /// Whether what was wanted to pass has passed at `now`.
+    fn has_passed(&mut self, now: Time) -> bool {
+        let has = self.wanted_until.is_some_and(|until| now >= until);
+        if has {
+            self.wanted_until = None;
+        }
+        has
     }
 }
 
@@ -98,6 +122,18 @@ impl Gate {
         }
     }
 
+    /// Returns when so much has passed by the machine's clock, and no more.
+    pub(crate) fn let_pass(&self, wanted: Duration) {
+        let mut doors = self.doors();
+        doors.wanted = Some(wanted);
+        self.opened.notify_all();
+        let is_due = |doors: &mut Doors| doors.wanted.is_some() || doors.wanted_until.is_some();
+        let waited = self.passed.wait_timeout_while(doors, PATIENCE, is_due);
+        let (doors, timed_out) = waited.unwrap_or_else(PoisonError::into_inner);
+        drop(doors);
+        assert!(!timed_out.timed_out(), "the machine ticks no more");
+    }
+
     /// From now on at most `allowance` passes for each request: whoever asks many times a second does so by the
     /// machine's clock.
     pub(crate) fn limit(&self, allowance: Duration) {
@@ -111,15 +147,25 @@ impl Gate {
 
     fn hold(&self, now: Time) {
         let mut doors = self.doors();
-        while !doors.let_pass(now) {
-            let waited = self.opened.wait_timeout(doors, LOOK_EVERY);
-            let timed_out;
-            (doors, timed_out) = waited.unwrap_or_else(PoisonError::into_inner);
-            if timed_out.timed_out() && doors.open > 0 {
-                // The request has not come in yet; it is taken at the end of a tick.
-                doors.until = Some(now + TRICKLE);
+        loop {
+            let goes_on = doors.let_pass(now);
+            if doors.has_passed(now) {
+                self.passed.notify_all();
             }
+            if goes_on {
+                return;
+            }
+            if doors.open > 0 && self.has_an_order() {
+                doors.until = Some(now + TRICKLE);
+                continue;
+            }
+            let waited = self.opened.wait_timeout(doors, LOOK_EVERY);
+            (doors, _) = waited.unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    fn has_an_order(&self) -> bool {
+        self.desk.get().is_some_and(|desk| desk.unanswered() > 0)
     }
 
     fn doors(&self) -> MutexGuard<'_, Doors> {
@@ -270,6 +316,8 @@ impl Stage {
         });
         drop(passing);
         let service = service.unwrap_or_else(|error| panic!("{error}"));
+        let known = gate.desk.set(service.desk());
+        known.expect("a gate has one service");
         Self {
             desk: service.desk(),
             gate,

@@ -34,7 +34,6 @@ use groups::Grouped;
 use lease::Lease;
 pub(crate) use mechanics::Mechanics;
 use motion::Motions;
-pub(crate) use orders::answer;
 use question::Talk;
 use run::Runs;
 pub(crate) use run::Task as RunTask;

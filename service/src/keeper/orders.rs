@@ -205,7 +205,7 @@ impl Keeper {
     pub(crate) fn dismiss(&mut self) {
         while let Ok(letter) = self.inbox.try_recv() {
             let problem = Problem::new(Code::Ending, "the service ends", "");
-            answer(letter.reply, Err(problem));
+            letter.reply.send(Err(problem));
         }
     }
 
@@ -217,7 +217,7 @@ impl Keeper {
     /// Sends the answers whose snapshot is out.
     pub(super) fn send_answers(&mut self) {
         for (reply, answered) in self.answers.drain(..) {
-            answer(reply, answered);
+            reply.send(answered);
         }
     }
 
@@ -225,9 +225,4 @@ impl Keeper {
     pub(super) fn name(&self, at: usize) -> &Arc<str> {
         &self.seats[at].name
     }
-}
-
-/// Whoever asked may have gone: that is no reason to do anything else.
-pub(crate) fn answer(reply: Reply, answered: Answered) {
-    let _ = reply.send(answered);
 }

@@ -217,14 +217,17 @@ fn the_axis_is_off_while_somebody_is_asked_and_a_stop_by_anybody_ends_that() {
 #[test]
 fn nothing_is_moved_or_switched_on_while_hands_are_in_the_machine() {
     with_table(|bed| {
-        let id = bed.run_of(RunKind::Calibrate);
         let queued = MoveRequest {
             if_moving: IfMoving::Queue,
             uncompensated: true,
             ..MoveRequest::of("c", Radians::from_degrees(10.0))
         };
+        // Both come in before the run has switched its table off.
+        bed.stage.gate.limit(Duration::from_millis(2));
+        let id = bed.run_of(RunKind::Calibrate);
         // It waits for the end of the run, which is not while somebody is asked.
         let waits = bed.begin(&queued);
+        bed.stage.gate.lift_limit();
         let question = bed.asked(&id);
         let stopped = bed.ended(&waits);
         assert_eq!(stopped.state, MotionState::Stopped, "{stopped:?}");
