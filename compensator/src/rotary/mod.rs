@@ -41,6 +41,7 @@
 //! | `solver` | one evaluation after the other, until no outlier is left |
 //! | `solution`, `solve` | all of it, with uncertainties |
 //! | `budget` | what these are made of |
+//! | `harmonics` | the table error as periods of a turn |
 //! | `line_signal` | where lines are in the sampled signal of a detector |
 //! | `sighted` | readings of one placement that a person made |
 //! | `periodic` | deviation between the lines, and the command that undoes it |
@@ -54,6 +55,7 @@
 mod budget;
 mod closed_form;
 mod design;
+mod harmonics;
 mod lanes;
 mod line_signal;
 mod majority;
@@ -78,6 +80,7 @@ pub(crate) use design::gcd;
 pub use design::{
     Design, DesignError, harmonic_max, rms_amplification_of_a_pair, rms_amplification_of_all,
 };
+pub use harmonics::{TABLES_PER_FALSE_HARMONIC, TableHarmonic, harmonics};
 pub use line_signal::{
     LineShape, LinesSeen, SAMPLES_MIN, SignalSample, WIDTHS_APART, lines_in, width_seen,
 };

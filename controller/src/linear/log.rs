@@ -47,7 +47,7 @@ pub struct LinearLog {
     /// By what it is judged, if it is a verification.
     pub criterion: Option<CriterionEntry>,
     /// What zero searches read on their way.
-    pub sweeps: Vec<HallSweepEntry>,
+    pub sweeps: Vec<SweepLog>,
     /// How late the SYNCs of each bus were.
     pub syncs: Vec<SyncsEntry>,
     /// Its zeros.
@@ -62,6 +62,15 @@ pub struct LinearLog {
     pub reached: Vec<ReachedEntry>,
     /// What made it go on from them.
     pub went_on: Vec<WentOnEntry>,
+}
+
+/// What one zero search read on its way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepLog {
+    /// What it read.
+    pub read: HallSweepEntry,
+    /// Which of the journal's zeros it led to; `None` where the journal broke off between the two.
+    pub led_to: Option<usize>,
 }
 
 impl Log for LinearLog {
@@ -88,9 +97,9 @@ impl Log for LinearLog {
         match entry {
             LinearEntry::Point(it) => self.points.push(it),
             LinearEntry::Criterion(it) => self.criterion = Some(it),
-            LinearEntry::HallSweep(it) => self.sweeps.push(it),
+            LinearEntry::HallSweep(read) => self.sweeps.push(SweepLog { read, led_to: None }),
             LinearEntry::Syncs(it) => self.syncs.push(it),
-            LinearEntry::Zero(it) => self.zeros.push(it),
+            LinearEntry::Zero(it) => self.take_zero(it),
             LinearEntry::Rotation(it) => self.rotations.push(it),
             LinearEntry::Closed(it) => self.closures.push(it),
             LinearEntry::Job(it) => self.job = Some(it),
@@ -114,6 +123,18 @@ impl Log for LinearLog {
             let mut left = went_on.iter().map(|it| (it.repetition, it.number));
             left.any(|stop| stop == (it.repetition, it.number))
         });
+    }
+}
+
+impl LinearLog {
+    /// The sweep that was journalled last is that of this zero, unless another zero came of it.
+    fn take_zero(&mut self, zero: ZeroEntry) {
+        let number = self.zeros.len();
+        let last = self.sweeps.last_mut();
+        if let Some(sweep) = last.filter(|it| it.led_to.is_none()) {
+            sweep.led_to = Some(number);
+        }
+        self.zeros.push(zero);
     }
 }
 

@@ -30,6 +30,7 @@ pub struct PlatformConfig {
     pub speed_mm_per_s: f64,
     /// Likewise.
     #[schemars(range(min = 0.01, max = 1000000.0), extend("x-range" = "at most the axes'"))]
+    #[schemars(extend("x-own" = true))]
     pub acceleration_mm_per_s2: f64,
     /// The work range along x, to both sides; refused when the screws do not reach its corners.
     #[schemars(range(min = 0.0, max = 1000.0))]

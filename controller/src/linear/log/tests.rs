@@ -88,27 +88,52 @@ fn a_run_cut_short_counts_once_however_often_it_is_resumed() {
     );
 }
 
-#[test]
-fn a_sweep_has_a_voltage_of_each_sensor_at_each_place() {
+fn sweep(slope_v: Vec<f64>) -> LinearEntry {
     let held = HeldEntry {
         position_m: 0.0,
         peak_v: 1.6,
         slope_v: 0.0,
     };
-    let sweep = |slope_v: Vec<f64>| {
-        LinearEntry::HallSweep(HallSweepEntry {
-            positions_m: vec![-1e-3, 1e-3],
-            peak_v: vec![0.6, 0.6],
-            slope_v,
-            peak_m: 0.0,
-            peak_max_v: 1.6,
-            g1: held,
-            g2: held,
-            p0: held,
-        })
-    };
+    LinearEntry::HallSweep(HallSweepEntry {
+        positions_m: vec![-1e-3, 1e-3],
+        peak_v: vec![0.6, 0.6],
+        slope_v,
+        peak_m: 0.0,
+        peak_max_v: 1.6,
+        g1: held,
+        g2: held,
+        p0: held,
+    })
+}
+
+fn zero() -> LinearEntry {
+    LinearEntry::Zero(ZeroEntry {
+        origin_m: 1e-6,
+        standard_uncertainty_m: 1e-8,
+        patent_p0_m: 1e-6,
+        peak_max_v: 1.6,
+        mid_v: 0.0,
+        at_s: 1.5,
+        budget: None,
+    })
+}
+
+#[test]
+fn a_sweep_has_a_voltage_of_each_sensor_at_each_place() {
     let judged = |entry: LinearEntry| LinearLog::default().judge(&header(), &entry);
     assert!(judged(sweep(vec![-1.3, 1.3])).is_ok());
     assert!(judged(sweep(vec![-1.3])).is_err());
     assert!(judged(sweep(vec![-1.3, f64::NAN])).is_err());
+}
+
+#[test]
+fn a_sweep_belongs_to_the_zero_that_follows_it_and_to_no_other() {
+    let read = || sweep(vec![-1.3, 1.3]);
+    let mut log = LinearLog::default();
+    // An earlier program journalled a zero without its sweep; another broke off between the two.
+    for entry in [zero(), read(), read(), zero(), zero()] {
+        log.take(entry);
+    }
+    let led_to: Vec<_> = log.sweeps.iter().map(|it| it.led_to).collect();
+    assert_eq!((led_to, log.zeros.len()), (vec![None, Some(1)], 3));
 }

@@ -163,8 +163,9 @@ fn zeros(logs: &[&LinearLog]) -> String {
     }
     html += "</table>";
     for log in logs {
-        for (at, sweep) in log.sweeps.iter().enumerate() {
-            html += &hall::html(sweep, log.zeros.get(at));
+        for sweep in &log.sweeps {
+            let zero = sweep.led_to.map(|it| &log.zeros[it]);
+            html += &hall::html(&sweep.read, zero);
         }
     }
     html + &uncertainty::of_last(logs.iter().flat_map(|it| &it.zeros))

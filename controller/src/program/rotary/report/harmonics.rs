@@ -2,11 +2,12 @@
 
 use core::fmt::Write as _;
 
+use compensator::rotary::{TABLES_PER_FALSE_HARMONIC, TableHarmonic};
+
 use crate::program::page::chart::{BLUE, Mark, ORANGE, Series, chart};
 use crate::rotary::RotaryContent;
-use crate::rotary::harmonics::{FALSE_ALARMS, TableHarmonic};
 
-/// So many are in the table: the largest.
+/// So many of those that are more than noise are in the table: the largest.
 const LISTED: usize = 12;
 
 /// All as a picture, the largest with their uncertainty, and up to where they hold.
@@ -14,7 +15,7 @@ pub(super) fn html(content: &RotaryContent) -> String {
     let all = content.harmonics();
     let significant = all.iter().filter(|it| it.is_significant).count();
     format!(
-        "<h3>Harmonics</h3><p>{significant} of {} are larger than noise makes any of them in one of {FALSE_ALARMS:.0} tables. The table error {}.</p>\
+        "<h3>Harmonics</h3><p>{significant} of {} are larger than noise makes any of them in one of {TABLES_PER_FALSE_HARMONIC:.0} tables. The table error {}.</p>\
          <figure>{}</figure>{}",
         all.len(),
         content.harmonics_told(),
@@ -39,6 +40,10 @@ fn picture(all: &[TableHarmonic]) -> String {
 }
 
 fn table(mut all: Vec<TableHarmonic>) -> String {
+    all.retain(|it| it.is_significant);
+    if all.is_empty() {
+        return String::new();
+    }
     all.sort_by(|a, b| b.amplitude.value().total_cmp(&a.amplitude.value()));
     let mut html = String::from(
         "<table><tr><th>periods in a turn</th><th>amplitude (″)</th><th>U, k = 2 (″)</th><th>phase (°)</th></tr>",
