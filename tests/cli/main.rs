@@ -13,6 +13,7 @@ mod intended;
 mod interrupted;
 mod job;
 mod jog;
+mod journal;
 mod killed;
 mod manager;
 mod monitor;

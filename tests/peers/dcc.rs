@@ -20,7 +20,7 @@ fn schema() -> Option<PathBuf> {
 }
 
 /// The command beside the tests that cargo built.
-fn truestage(folder: &Path, words: &[&str]) -> Value {
+pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Value {
     let test = std::env::current_exe().expect("a process knows its program");
     let program = test
         .ancestors()

@@ -1,6 +1,6 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
 //! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
-//! lxml, which judges certificates by the schema of the PTB;
+//! lxml, which judges certificates by the schema of the PTB; DuckDB and the library of MCAP, which read exported journals;
 //! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its page.
 
 mod analog;
@@ -9,6 +9,7 @@ mod csp;
 mod dcc;
 mod drive;
 mod emulated;
+mod export;
 mod http;
 mod local_node;
 mod page;

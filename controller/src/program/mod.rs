@@ -19,6 +19,7 @@ mod exchange;
 mod explain;
 mod intended;
 mod jog;
+mod journal;
 mod json;
 mod kept;
 mod kind;
@@ -165,6 +166,9 @@ enum Command {
         #[arg(long)]
         quick: bool,
     },
+    /// The journals of runs.
+    #[command(subcommand)]
+    Journal(journal::JournalCommand),
     /// A self-contained HTML page of a run.
     Report(report::ReportArgs),
     /// A script by which a shell completes the words of this program: for bash,
@@ -472,6 +476,7 @@ pub fn main(
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
         Command::Token(args) => token::run(args, output, enrol),
+        Command::Journal(command) => journal::run(&command, output),
         Command::Report(args) => report::run(&args, output),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(&args, Cli::command(), output),

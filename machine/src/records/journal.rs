@@ -358,6 +358,23 @@ pub fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
 /// cannot be.
 pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
     let bytes = fs::read(path).map_err(io_error("read", path))?;
+    journal_of(path, &bytes)
+}
+
+/// Reads a journal of whatever kind, and the entry of each whole line of it, marks included: JSON without its
+/// checksum, the members in the order in which they were written.
+///
+/// # Errors
+/// Those of [`read_journal`].
+pub fn read_entries(path: &Path) -> Result<(ReadJournal<AnyLog>, Vec<String>), StoreError> {
+    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let read = journal_of(path, &bytes)?;
+    let whole = bytes.split_inclusive(|byte| *byte == b'\n');
+    let whole = whole.filter_map(|line| json_of(line).ok());
+    Ok((read, whole.collect()))
+}
+
+fn journal_of<L: Log>(path: &Path, bytes: &[u8]) -> Result<ReadJournal<L>, StoreError> {
     let mut read: Option<ReadJournal<L>> = None;
     let mut valid_bytes = 0;
     let mut torn = false;
@@ -385,8 +402,14 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
     })?;
     read.valid_bytes = valid_bytes;
     read.torn = torn;
-    read.blake3 = blake3::hash(&bytes).to_hex().to_string();
+    read.blake3 = blake3::hash(bytes).to_hex().to_string();
     Ok(read)
+}
+
+/// The entry of a whole line.
+fn json_of(line: &[u8]) -> Result<String, String> {
+    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
+    opened(text.strip_suffix('\n').ok_or("the line has no end")?)
 }
 
 fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
@@ -394,9 +417,7 @@ fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
     struct Tag {
         entry: String,
     }
-    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
-    let text = text.strip_suffix('\n').ok_or("the line has no end")?;
-    let json = opened(text)?;
+    let json = json_of(line)?;
     let tag: Tag = serde_json::from_str(&json).map_err(|error| error.to_string())?;
     let parsed = match MARKS.contains(&tag.entry.as_str()) {
         true => serde_json::from_str(&json).map(Line::Mark),

@@ -48,7 +48,8 @@ pub use hash::ConfigHash;
 pub use head::{EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead};
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_journal,
+    AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_entries,
+    read_journal,
 };
 pub use lease::Lease;
 pub use line::{opened, sealed};
