@@ -21,9 +21,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let correction = Box::new(machine.table_correction(&["x"])?);
         let (mut engine, mut desk) = Engine::new(machine, &["x"], correction)?;
         engine.in_real_time();
-        let path = read_path(&path, engine.axes(), engine.period()).expect("a path");
+        let path = read_path(&path, &engine.path_form(None)).expect("a path");
         let beside = path.departure.size.mm();
-        println!("a spline through the rows, at most {beside:.3} mm beside their straight joins");
+        println!(
+            "{} through the rows, at most {beside:.3} mm beside their straight joins",
+            path.join
+        );
         let writer = std::thread::spawn(move || {
             desk.correct(true).expect("the loop listens");
             let mut points = path.points.into_iter();

@@ -204,8 +204,9 @@ pub struct RunRequest {
     /// Verify: without the calibration, the stage as found. Path: by the encoders alone.
     #[serde(default)]
     pub uncompensated: bool,
-    /// Path: its rows as a CSV file has them, a heading and a row for each moment: `time_s,x_mm,y_mm,z_mm`. Between
-    /// the rows runs a cubic spline, at rest at both ends. At most 600 s.
+    /// Path: its rows as a CSV file has them, a heading and a row for each moment: `time_s,x_mm,y_mm,z_mm`. A line
+    /// `# join: linear 50um` above the heading joins them by straight lines whose corners are passed within that
+    /// length; without it runs a cubic spline, at rest at both ends. At most 600 s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 1000000)]
     pub path: Option<String>,

@@ -275,7 +275,10 @@ pub struct RunPlanView {
     pub seconds_at_least: f64,
     /// What a person will be asked to do.
     pub asks: Vec<String>,
-    /// Where a path is farthest from the straight joins of its rows: at corners it swings out.
+    /// What joins the rows of a path: `spline`, or `linear` with how far from a corner it may pass.
+    #[serde(default)]
+    pub join: Option<String>,
+    /// Where a path is farthest from the straight joins of its rows: at corners it swings out, or cuts them.
     #[serde(default)]
     pub departure: Option<DepartureView>,
 }
@@ -290,6 +293,7 @@ impl RunPlanView {
             travel: Some(Quantity::mm(judged.travel)),
             seconds_at_least: judged.takes.as_secs_f64(),
             asks: Vec::new(),
+            join: Some(judged.path.join.to_string()),
             departure: Some(DepartureView {
                 size: Quantity::mm(departure.size),
                 at_s: departure.at_s,

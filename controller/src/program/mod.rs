@@ -124,9 +124,9 @@ enum Command {
     /// as its file says; each point is in the journal with its uncertainty. It is judged whole before anything
     /// moves; --dry-run does only that. One that was interrupted goes on with --resume.
     ///
-    /// A path has the columns time_s,x_mm,y_mm,z_mm. Between the rows each axis follows the cubic spline through them, at rest at both ends, not
-    /// straight lines: at a corner, or where the rows suddenly end, it swings out. How far at most, and
-    /// where, is printed before anything moves. Everything that will be driven is judged first (soft
+    /// A path has the columns time_s,x_mm,y_mm,z_mm. Its rows are joined by the cubic spline through them, at rest at both
+    /// ends, which swings out at a corner or where the rows suddenly end, or by straight lines with rounded
+    /// corners (--join linear --blend 50um). How far at most, and where, is printed before anything moves. Everything that will be driven is judged first (soft
     /// limits, speed, acceleration, jerk, calibrated volume), not only the rows.
     Run(run::RunArgs),
     /// Record or drop a state of three axes that is kept on purpose, so that all parts are alike.

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use machine::engine::Join;
+use units::Metres;
+use units::text::length;
 
 use crate::Failure;
 use crate::program::linear::job::{self, JobOptions};
@@ -32,7 +35,59 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub(super) first_part: bool,
     #[command(flatten)]
+    joined: JoinArgs,
+    #[command(flatten)]
     agreed: AgreedArgs,
+}
+
+/// What joins the rows of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum JoinName {
+    /// The cubic spline through all rows; at a corner it swings out.
+    Spline,
+    /// Straight lines, whose corners are rounded.
+    Linear,
+}
+
+#[derive(Clone, Copy, Debug, Args)]
+struct JoinArgs {
+    /// What joins the rows of a path; what its file says (`# join: linear 50um` above its heading) when not given, and
+    /// the spline where that says nothing.
+    #[arg(long, value_enum)]
+    join: Option<JoinName>,
+    /// With `--join linear`: how far from a corner the path may pass: `50um`, `0.1mm`.
+    #[arg(long, value_name = "LENGTH", value_parser = blend_of)]
+    blend: Option<Metres>,
+}
+
+fn blend_of(text: &str) -> Result<Metres, String> {
+    let positive = length(text).filter(|it| it.value() > 0.0);
+    positive.ok_or_else(|| "write a length with its unit, more than 0: 50um, 0.1mm".into())
+}
+
+impl JoinArgs {
+    const fn is_given(self) -> bool {
+        self.join.is_some() || self.blend.is_some()
+    }
+
+    /// # Errors
+    /// When straight lines are not told how far from a corner, or a spline is.
+    fn join(self) -> Result<Option<Join>, Failure> {
+        match (self.join, self.blend) {
+            (None, None) => Ok(None),
+            (Some(JoinName::Spline), None) => Ok(Some(Join::Spline)),
+            (Some(JoinName::Linear), Some(blend)) => Ok(Some(Join::Linear { blend })),
+            (Some(JoinName::Linear), None) => Err(Failure::Usage {
+                what: "--join linear, and nothing says how far from a corner the path may pass"
+                    .into(),
+                help: "add --blend with a length: --blend 50um".into(),
+            }),
+            (_, Some(_)) => Err(Failure::Usage {
+                what: "--blend is for straight lines".into(),
+                help: "add --join linear, or leave it out".into(),
+            }),
+        }
+    }
 }
 
 impl RunArgs {
@@ -52,7 +107,7 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
         uncompensated,
         beyond,
     } = args.agreed;
-    let resume = args.resume.clone();
+    let (resume, joined) = (args.resume.clone(), args.joined);
     let (machine, path) = args.settle();
     let is_job = path
         .extension()
@@ -63,12 +118,12 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
             help: "a job is a .toml file, a path has columns (.csv); leave the option out".into(),
         })
     };
-    let of_paths = is_first || uncompensated;
+    let of_paths = is_first || uncompensated || joined.is_given();
     let of_jobs = yes || beyond || resume.is_some();
     match (is_job, of_paths, of_jobs) {
-        (true, true, _) => {
-            usage("--first-part and --uncompensated are for paths of three axes, and this is a job")
-        }
+        (true, true, _) => usage(
+            "--first-part, --uncompensated, --join and --blend are for paths of three axes, and this is a job",
+        ),
         (false, _, true) => usage("--yes, --beyond and --resume are for jobs, and this is a path"),
         (true, false, _) => {
             let options = JobOptions {
@@ -82,7 +137,12 @@ pub(crate) fn run(args: RunArgs, output: Output) -> Ended {
         (false, _, false) if is_first && uncompensated => {
             usage("--first-part records what the correction leaves: not with --uncompensated")
         }
-        (false, _, false) if dry_run => part::only_judged(&machine, &path, !uncompensated, output),
-        (false, _, false) => part::run(&machine, &path, (is_first, uncompensated), output),
+        (false, _, false) if dry_run => {
+            part::only_judged(&machine, &path, joined.join()?, !uncompensated, output)
+        }
+        (false, _, false) => {
+            let (join, how) = (joined.join()?, (is_first, uncompensated));
+            part::run(&machine, &path, join, how, output)
+        }
     }
 }

@@ -378,6 +378,19 @@ pub enum PathRefusal {
     /// The axes cannot follow it: soft limits, speed, acceleration or jerk.
     #[error(transparent)]
     Point(#[from] PushError),
+    /// They cannot follow a corner of straight lines within what is allowed.
+    #[error(
+        "{source}; at this speed the corner in line {line} can be passed within {:.3} mm: allow as much, or go slower",
+        wants.mm() + 0.0005
+    )]
+    Corner {
+        /// The point that cannot be driven.
+        source: PushError,
+        /// The line of the corner's row.
+        line: usize,
+        /// How far from it the axes can pass.
+        wants: Metres,
+    },
     /// It leaves the volume that is calibrated.
     #[error("at {at_s:.4} s: {source}")]
     Volume {

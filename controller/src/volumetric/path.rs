@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::path::Path;
 
 use compensator::volumetric::{Point, Volume};
-use machine::engine::{CsvPath, Lack, Live, Validity, read_path};
+use machine::engine::{CsvPath, Join, Lack, Live, PathFault, PushError, Validity, read_path};
 use units::Metres;
 
 use crate::failure::Failure;
@@ -28,13 +28,14 @@ impl VolumePathJudge {
     }
 
     /// Reads and judges all of the path in `text`, which is called `file`, point by point as it will be driven: what
-    /// cannot be made to its end is not begun.
+    /// cannot be made to its end is not begun. `join` joins its rows, or what the text says.
     ///
     /// # Errors
     /// What cannot be read, or the first point that cannot be driven.
     pub(crate) fn judge(
         &self,
         (file, text): (&Path, &str),
+        join: Option<Join>,
         is_corrected: bool,
     ) -> Result<CsvPath, Failure> {
         let refused = |source| VolumetricFailure::RefusedPath {
@@ -42,13 +43,13 @@ impl VolumePathJudge {
             source,
         };
         let engine = self.mover.engine();
-        let path = read_path(text, engine.axes(), engine.period());
+        let path = read_path(text, &engine.path_form(join));
         let path = path.map_err(|source| Failure::Usage {
             what: format!("{}: {source}", file.display()),
             help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm; see README.md".into(),
         })?;
         let checked = self.mover.check_path(&path.points);
-        checked.map_err(|source| refused(source.into()))?;
+        checked.map_err(|source| refused(at_corner(source, &path)))?;
         if is_corrected {
             for (point, period) in path.points.iter().zip(0..) {
                 let place = Point::new(point[0], point[1], point[2]);
@@ -58,6 +59,28 @@ impl VolumePathJudge {
             }
         }
         Ok(path)
+    }
+}
+
+/// Why `path` is refused: where it is at a corner that the axes cannot follow, what they could.
+fn at_corner(source: PushError, path: &CsvPath) -> PathRefusal {
+    let PushError::Refused(point) = &source else {
+        return source.into();
+    };
+    // Along a line nothing speeds up.
+    if !matches!(point.fault, PathFault::Acceleration { .. } | PathFault::Jerk { .. }) {
+        return source.into();
+    }
+    let off = |at_s: f64| (at_s - point.at_s).abs();
+    let corners = path.tight.iter();
+    let nearest = corners.min_by(|one, other| off(one.at_s).total_cmp(&off(other.at_s)));
+    match nearest {
+        Some(corner) => PathRefusal::Corner {
+            source,
+            line: corner.line,
+            wants: corner.wants,
+        },
+        None => source.into(),
     }
 }
 

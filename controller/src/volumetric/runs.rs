@@ -127,7 +127,7 @@ fn paths(machine: &mut Machine) -> Result<PathJudge, Failure> {
         if is_corrected {
             require_measured(store)?;
         }
-        let path = judge.judge((Path::new(PATH), rows), is_corrected)?;
+        let path = judge.judge((Path::new(PATH), rows), None, is_corrected)?;
         Ok(JudgedPath::new(path, judge.period()))
     }))
 }
@@ -151,7 +151,7 @@ fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "largest_correction_um": corrected.map(|it| it.largest.map(|it| it.um())),
             "u_max_um": corrected.map(|it| it.u.map(|it| it.um())),
         }),
-        told: words.map(|it| (it.followed)(&followed, &judged.path.departure)),
+        told: words.map(|it| (it.followed)(&followed, &judged.path)),
         bad: None,
     })
 }

@@ -1,6 +1,6 @@
 //! What three axes gave, in the words of the command line.
 
-use machine::engine::{Departure, Live};
+use machine::engine::{CsvPath, Live};
 
 use crate::runs::Told;
 use crate::volumetric::VolumetricCalibrated;
@@ -22,5 +22,5 @@ pub struct VolumetricTeller {
     /// A corrected move that was made, by its last period.
     pub moved: fn(live: &Live) -> Told,
     /// A path that was followed, and where it was farthest from the straight joins of its rows.
-    pub followed: fn(followed: &PathFollowed, departure: &Departure) -> Told,
+    pub followed: fn(followed: &PathFollowed, path: &CsvPath) -> Told,
 }

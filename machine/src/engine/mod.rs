@@ -5,7 +5,7 @@
 //!   to stop. Sans-io, of fixed size.
 //! - `hear` collects what was heard of one SYNC. `seats` knows which devices these are, `run` is its loop, [`Machine::follow`]: sleep to the absolute deadline, SYNC, listen, decide,
 //!   send. It runs in the thread that calls it (docs/decisions/0014).
-//! - `path` and `csv` write paths, `motion` plans moves and stops, `correction` limits what is
+//! - `path` and `csv` write paths (`rows`, `join` and `blended` say what of a file), `motion` plans moves and stops, `correction` limits what is
 //!   added.
 //!
 //! Two ways to stop. Trouble with the path or the host: a controlled stop, time-optimal within
@@ -17,6 +17,7 @@
 //! loop did lately. All of it passes through rings without locks. Linear axes only.
 
 mod account;
+mod blended;
 mod cause;
 mod correction;
 mod csv;
@@ -25,6 +26,7 @@ mod decide;
 mod decide_tests;
 mod failure;
 mod hear;
+mod join;
 mod judge;
 mod lack;
 mod limits;
@@ -33,6 +35,7 @@ mod motion;
 mod pace;
 mod path;
 mod planner;
+mod rows;
 mod run;
 mod seats;
 mod tables;
@@ -43,14 +46,16 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use units::{Metres, MetresPerSecond};
 
 pub use account::{Counts, Live, State};
+pub use blended::TightCorner;
 pub use cause::Cause;
 pub use correction::{
     CHANNELS_MAX, Channel, Corrected, Correction, NoCorrection, Observed, SPOTS_MAX,
     THERMOMETERS_MAX, ThermometerSample, Validity,
 };
-pub use csv::{CsvError, CsvFault, CsvPath, Departure, read_path};
+pub use csv::{CsvPath, Departure, PathForm, read_path};
 pub use drivers::transport::Histogram;
 pub use failure::EngineFailure;
+pub use join::Join;
 pub use judge::{PathError, PathFault};
 pub use lack::{Lack, Source};
 pub use limits::{AxisLimits, CorrectionLimits};
@@ -58,6 +63,7 @@ pub use moment::Moment;
 pub use motion::{Motion, MotionError};
 pub use pace::Timing;
 pub use path::{PathWriter, PushError};
+pub use rows::{CsvError, CsvFault};
 pub use tables::TableCorrection;
 
 use crate::failure::Failure;
@@ -82,6 +88,7 @@ pub type PerAxis<T> = [T; AXES_MAX];
 pub struct Engine {
     axes: Vec<String>,
     period: Duration,
+    limits: PerAxis<AxisLimits>,
     core: Core,
     timing: Timing,
     real_time: bool,
@@ -169,6 +176,7 @@ impl Engine {
         let engine = Self {
             axes,
             period,
+            limits,
             core,
             timing: Timing::default(),
             real_time: false,
@@ -189,6 +197,16 @@ impl Engine {
     /// From SYNC to SYNC.
     pub const fn period(&self) -> Duration {
         self.period
+    }
+
+    /// What a path must be made for that its axes follow, joined by `join`, or as its file says.
+    pub fn path_form(&self, join: Option<Join>) -> PathForm<'_> {
+        PathForm {
+            axes: &self.axes,
+            limits: &self.limits[..self.axes.len()],
+            period: self.period,
+            join,
+        }
     }
 
     /// What the loop is doing, or did last.

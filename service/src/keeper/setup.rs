@@ -108,6 +108,7 @@ fn shown(planned: Planned) -> RunPlanView {
         }),
         seconds_at_least: planned.at_least.as_secs_f64(),
         asks: planned.asks,
+        join: None,
         departure: None,
     }
 }

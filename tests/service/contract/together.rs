@@ -391,6 +391,21 @@ pub(super) fn path(rows: &str) -> RunRequest {
     }
 }
 
+/// The same rows with straight lines, as the text says: the corner is passed within what that allows.
+fn has_straight_lines(bed: &Bed<'_>, corner: &RunRequest) {
+    let rows = corner.path.as_ref().expect("it has rows");
+    let straight = RunRequest {
+        path: Some(format!("# join: linear 100um\n{rows}")),
+        ..corner.clone()
+    };
+    let id = bed.client.plan(&anna(), &straight).unwrap();
+    let plan = bed.client.run(&id, Duration::ZERO).unwrap().plan;
+    assert_eq!(plan.join.as_deref(), Some("linear 100um"));
+    let size = plan.departure.expect("it turns a corner").size.value;
+    assert!(size > 0.0 && size <= 0.1, "{size} mm");
+    assert!(plan.seconds_at_least > 2.0, "it begins and ends at rest");
+}
+
 fn follows_paths(bed: &Bed<'_>) {
     let before = bed.encoder_mm("x");
     let refused = |request: &RunRequest, code: Code, words: &[&str]| {
@@ -431,6 +446,8 @@ fn follows_paths(bed: &Bed<'_>) {
         (RunState::Planned, 1001)
     );
     assert_eq!(planned.plan.seconds_at_least, 2.0);
+    assert_eq!(planned.plan.join.as_deref(), Some("spline"));
+    has_straight_lines(bed, &corner);
     let travel = planned.plan.travel.expect("it is known").value;
     assert!((8.0..9.0).contains(&travel), "{travel} mm");
     let departure = planned.plan.departure.expect("it turns a corner");

@@ -30,6 +30,7 @@ mod volumetric_day;
 mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;
+mod volumetric_path;
 mod volumetric_resume;
 mod volumetric_rolls;
 mod volumetric_scatter;

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use compensator::volumetric::Axis;
-use machine::engine::{CsvPath, Departure};
+use machine::engine::{CsvPath, Departure, Join};
 use machine::records::short;
 use serde_json::{Value, json};
 use units::Metres;
@@ -38,6 +38,7 @@ struct Ready {
 pub(crate) fn run(
     args: &MachineArgs,
     file: &Path,
+    join: Option<Join>,
     (is_first, uncompensated): (bool, bool),
     output: Output,
 ) -> Ended {
@@ -48,9 +49,9 @@ pub(crate) fn run(
     }
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
     let judge = session.machine.volumetric()?.path_judge()?;
-    let path = judge.judge((file, &path), !uncompensated)?;
+    let mut path = judge.judge((file, &path), join, !uncompensated)?;
     output.note(&before_it_moves(file, &path));
-    let CsvPath { points, departure } = path;
+    let points = core::mem::take(&mut path.points);
     let ready = |machine: &mut Machine, store: &Store| {
         if is_first {
             let (mover, part) = machine.volumetric()?.first_part(store)?;
@@ -65,11 +66,11 @@ pub(crate) fn run(
     };
     let follow =
         |machine: &mut Machine, store: &Store, ready| follow_part(machine, store, ready, points);
-    let ((path, kept), counters) = zeroed_volume(session, ready, follow)?;
+    let ((along, kept), counters) = zeroed_volume(session, ready, follow)?;
     let Told {
         mut text,
         mut value,
-    } = followed(&path, &departure);
+    } = followed(&along, &path);
     if let Some(kept) = &kept {
         text += &format!(
             "\nthe errors that the detectors saw were not corrected in this part; {} keeps them: \
@@ -83,14 +84,15 @@ pub(crate) fn run(
 }
 
 /// What came of a path.
-pub(super) fn followed(followed: &PathFollowed, departure: &Departure) -> Told {
+pub(super) fn followed(followed: &PathFollowed, path: &CsvPath) -> Told {
     let said = match &followed.corrected {
         Some(corrected) => corrected_text(corrected),
         None => "NOT CORRECTED: by the encoders alone".into(),
     };
     let (count, timing) = (followed.count, &followed.timing);
     let mut value = json!({"points": count, "corrected": followed.corrected.is_some(),
-                           "largest_departure": departure_value(departure),
+                           "join": path.join.to_string(),
+                           "largest_departure": departure_value(&path.departure),
                            "thread": followed.thread});
     if let Some(corrected) = &followed.corrected {
         write_corrected(corrected, &mut value);
@@ -105,6 +107,7 @@ pub(super) fn followed(followed: &PathFollowed, departure: &Departure) -> Told {
 pub(crate) fn only_judged(
     args: &MachineArgs,
     file: &Path,
+    join: Option<Join>,
     is_corrected: bool,
     output: Output,
 ) -> Ended {
@@ -115,29 +118,37 @@ pub(crate) fn only_judged(
         require_measured(&store)?;
     }
     let judge = nowhere::machine(&loaded).volumetric()?.path_judge()?;
-    let path = judge.judge((file, &text), is_corrected)?;
-    let value = json!({"dry_run": true, "points": path.points.len(),
+    let path = judge.judge((file, &text), join, is_corrected)?;
+    let value = json!({"dry_run": true, "points": path.points.len(), "join": path.join.to_string(),
+                       "longer_s": path.longer.as_secs_f64(),
                        "largest_departure": departure_value(&path.departure)});
     output.result(&before_it_moves(file, &path), &value)
 }
 
-/// What is driven, for whoever may still stop it: rows that turn a corner are not joined straight.
+/// What is driven, for whoever may still stop it: rows that turn a corner are not joined straight, or not passed.
 fn before_it_moves(file: &Path, path: &CsvPath) -> String {
-    let CsvPath { points, departure } = path;
+    let CsvPath {
+        points, departure, ..
+    } = path;
     let at = Axis::ALL.into_iter().zip(&departure.place);
     let at: Vec<String> = at
         .map(|(axis, it)| format!("{axis} {:.3}", it.mm()))
         .collect();
-    let [from, to] = departure.lines;
-    format!(
-        "{}: {} points along the cubic spline through the rows; it departs from the straight lines \
-         between them by {:.3} mm at most, at {:.3} s (lines {from} to {to}), {} mm",
-        file.display(),
-        points.len(),
-        departure.size.mm(),
-        departure.at_s,
-        at.join(" "),
-    )
+    let ([from, to], size, at_s) = (departure.lines, departure.size.mm(), departure.at_s);
+    let place = format!("at {at_s:.3} s (lines {from} to {to}), {} mm", at.join(" "));
+    let begin = format!("{}: {} points along", file.display(), points.len());
+    match path.join {
+        Join::Spline => format!(
+            "{begin} the cubic spline through the rows; it departs from the straight lines between them by \
+             {size:.3} mm at most, {place}"
+        ),
+        Join::Linear { blend } => format!(
+            "{begin} straight lines through the rows; no corner is passed farther than {size:.3} mm ({:.3} mm are \
+             allowed), {place}; to begin and end at rest it takes {:.3} s longer than the rows say",
+            blend.mm(),
+            path.longer.as_secs_f64()
+        ),
+    }
 }
 
 fn departure_value(departure: &Departure) -> Value {
@@ -339,7 +350,7 @@ mod tests {
         let loaded = config::parse(toml, "volumetric.toml").unwrap();
         let mut machine = Machine::new(&loaded, Box::new(Nobody));
         let judge = machine.volumetric().unwrap().path_judge().unwrap();
-        judge.judge((Path::new("path.csv"), text), is_corrected)
+        judge.judge((Path::new("path.csv"), text), None, is_corrected)
     }
 
     /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.
@@ -374,6 +385,36 @@ mod tests {
     fn a_file_that_is_no_path_is_a_matter_of_usage() {
         let refused = judge("time_s,x_mm\n", false).unwrap_err();
         assert_eq!(refused.exit_code(), 2, "{refused}");
+    }
+
+    /// Along x, then along y, at 10 mm/s.
+    fn corner(join: &str) -> String {
+        format!("{join}time_s,x_mm,y_mm,z_mm\n0,100,100,100\n2,120,100,100\n4,120,120,100\n")
+    }
+
+    #[test]
+    fn straight_lines_are_driven_where_the_file_says_so_and_a_tight_corner_says_what_it_needs() {
+        let path = judge(&corner("# join: linear 1mm\n"), true).unwrap();
+        let said = before_it_moves(Path::new("path.csv"), &path);
+        let by = path.departure.size.mm();
+        assert!((0.01..1.0).contains(&by), "{said}");
+        for part in [
+            "straight lines",
+            "(1.000 mm are allowed)",
+            "lines 3 to 5",
+            "longer",
+        ] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+        let tight = corner("# join: linear 1um\n");
+        check_refused(&tight, true, "the corner in line 4 can be passed within 0.");
+        assert_eq!(judge(&corner(""), true).unwrap().join, Join::Spline);
+        let unknown = judge(&corner("# join: circles\n"), true).unwrap_err();
+        assert_eq!(unknown.exit_code(), 2, "{unknown}");
+        assert!(
+            unknown.to_string().contains("line 1: `# join: circles`"),
+            "{unknown}"
+        );
     }
 
     #[test]
