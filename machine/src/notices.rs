@@ -1,16 +1,25 @@
 //! What the observer is told, now or when there is time for it.
 
+use core::time::Duration;
+
+use units::Time;
+
 use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 
 /// So many warnings are kept for later: as many as anybody reads.
 const WARNINGS_HELD: usize = 32;
 
+/// From one sign of life to the next.
+const SIGNS: Duration = Duration::from_millis(500);
+
 /// The observer, and the warnings for which there is no time now: whoever takes them may make their
 /// writer wait.
 pub(crate) struct Notices {
     pub(crate) observer: Box<dyn Observer>,
     held_back: Option<Vec<String>>,
+    /// When the observer hears the next time that the machine lives.
+    next_sign: Time,
 }
 
 impl Default for Notices {
@@ -18,6 +27,7 @@ impl Default for Notices {
         Self {
             observer: Box::new(Silent),
             held_back: None,
+            next_sign: Time::ZERO,
         }
     }
 }
@@ -29,6 +39,14 @@ impl Notices {
             None => self.observer.warning(&text),
             Some(held) if held.len() < held.capacity() => held.push(text),
             Some(_) => {}
+        }
+    }
+
+    /// Tells the observer now and then that the machine lives, also while a loop must not wait.
+    pub(crate) fn lives(&mut self, now: Time) {
+        if now >= self.next_sign {
+            self.next_sign = now + SIGNS;
+            self.observer.lives(now);
         }
     }
 

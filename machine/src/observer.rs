@@ -1,5 +1,9 @@
 //! Who is told how far a procedure has come.
 
+use core::time::Duration;
+
+use units::Time;
+
 /// The procedures of the cycle, as a person names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
@@ -51,6 +55,13 @@ impl Stage {
 pub trait Observer {
     /// `done` of `total` steps of `stage` on `axis` are done.
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64);
+
+    /// A part of `stage` begins that has no steps, and takes so long: a path that is followed.
+    fn begins(&mut self, _stage: Stage, _axis: &str, _takes: Duration) {}
+
+    /// The machine is alive at `now` by its clock: told twice a second while anything waits or axes follow a path, so
+    /// that nobody need be silent for long. Whoever takes it must not make the machine wait.
+    fn lives(&mut self, _now: Time) {}
 
     /// Something that a person should look after, although the machine goes on.
     fn warning(&mut self, _text: &str) {}

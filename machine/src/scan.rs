@@ -181,6 +181,8 @@ impl Scan<'_> {
             if let Some(arrival) = self.machine.transport.receive(until) {
                 note_answer(&arrival, port, answers);
             }
+            let now = self.machine.now();
+            self.machine.notices.lives(now);
             if self.machine.stop.is_requested() {
                 return Err(self.machine.stop.failure());
             }

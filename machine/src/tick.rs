@@ -42,6 +42,7 @@ impl Machine {
         self.fire_deadlines(now);
         let wanted = self.ports.is_synchronous;
         self.devices.keep_looking(now, wanted, &mut self.notices);
+        self.notices.lives(now);
         self.send_pending()?;
         self.judge_alarms()?;
         if self.supervision != Supervision::Stopping && self.stop.is_requested() {

@@ -145,6 +145,7 @@ pub(crate) struct Ended {
 impl Ended {
     fn new(output: &Output) -> Self {
         let text = String::from_utf8_lossy(&output.stdout);
+        check_no_silence(&String::from_utf8_lossy(&output.stderr));
         let json = if text.trim().is_empty() {
             Value::Null
         } else {
@@ -158,11 +159,39 @@ impl Ended {
         }
     }
 
+    /// One that was at work for longer than it may be silent, and said so.
+    #[track_caller]
+    pub(crate) fn that_told(self) -> Self {
+        assert!(self.said.contains("\n  at 8 s: "), "{self:#?}");
+        self
+    }
+
     /// The result of a program that must have ended with `code`.
     #[track_caller]
     pub(crate) fn with_code(self, code: i32) -> Value {
         assert_eq!(self.code, Some(code), "{self:#?}");
         self.json
+    }
+}
+
+/// So long may a program be silent while a machine is at work, in seconds of the machine's clock.
+const SILENCE_MAX_S: f64 = 5.0;
+
+/// Whether a program that is not at a terminal said every few seconds that it was at work (`  at 8 s: zero x, …`).
+#[track_caller]
+fn check_no_silence(said: &str) {
+    let times = said.lines().filter_map(|line| {
+        let (time, _) = line.strip_prefix("  at ")?.split_once(" s: ")?;
+        time.parse::<f64>().ok()
+    });
+    let mut last = 0.0;
+    for time in times {
+        // Both are rounded to a second.
+        assert!(
+            time - last <= SILENCE_MAX_S + 1.0,
+            "silent from {last} to {time} s:\n{said}"
+        );
+        last = time;
     }
 }
 

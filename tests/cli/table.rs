@@ -53,7 +53,7 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         let before = journal(&bench).expect("whole placements are kept");
         assert!(!before.complete);
 
-        let resumed = bench.run(&["calibrate", "--resume", "--yes"]);
+        let resumed = bench.run(&["calibrate", "--resume", "--yes"]).that_told();
         assert!(resumed.said.contains("placement 2 of 3"), "{resumed:?}");
         assert!(!resumed.said.contains("placement 1 of 3"), "{resumed:?}");
         let calibrated = resumed.with_code(0);

@@ -55,7 +55,8 @@ fn the_verbs_take_a_stage_through_its_cycle_from_process_to_process() {
         let zero = bench.run(&["zero"]).with_code(0);
         assert_eq!(zero["axis"], "x");
 
-        let calibrated = bench.run(&["calibrate", "--verify"]).with_code(0);
+        let calibrated = bench.run(&["calibrate", "--verify"]).that_told();
+        let calibrated = calibrated.with_code(0);
         assert_eq!(calibrated["verified"]["within_tolerance"], true);
         let id = text(&calibrated["calibration"]);
         assert!(bench.folder().join(text(&calibrated["path"])).exists());

@@ -6,10 +6,11 @@
 mod motions;
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use machine::records::StoreError;
 use serde_json::{Value, json};
+use units::Time;
 
 use crate::Failure;
 use crate::program::answering::{Answering, Asked};
@@ -163,6 +164,7 @@ impl Service {
         let mut person = waiting.person(&run["plan"])?;
         self.begin(&format!("{path}/{verb}"), &json!({}))?;
         let mut bars = Bars::new(waiting.output.is_json());
+        let begun = Instant::now();
         let ending = match run["can_resume"] == true {
             true => "pause",
             false => "abort",
@@ -171,6 +173,8 @@ impl Service {
         self.end_of(&path, &ender, (waiting.stop, waiting.output), |run| {
             let of = |name: &str| run[name].as_u64().unwrap_or(0);
             let axis = plain(run["of"].as_str().unwrap_or_default());
+            // The machine's clock is the service's.
+            bars.lives(Time::ZERO + begun.elapsed());
             if of("steps") > 0 {
                 bars.progress(stage, &axis, of("steps_done"), of("steps"));
             }

@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::path::Path;
 
 use compensator::volumetric::{Point, Volume};
+use machine::Stage;
 use machine::engine::{CsvPath, Join, Lack, Live, PathFault, PushError, Validity, read_path};
 use units::Metres;
 
@@ -68,7 +69,10 @@ fn at_corner(source: PushError, path: &CsvPath) -> PathRefusal {
         return source.into();
     };
     // Along a line nothing speeds up.
-    if !matches!(point.fault, PathFault::Acceleration { .. } | PathFault::Jerk { .. }) {
+    if !matches!(
+        point.fault,
+        PathFault::Acceleration { .. } | PathFault::Jerk { .. }
+    ) {
         return source.into();
     }
     let off = |at_s: f64| (at_s - point.at_s).abs();
@@ -159,6 +163,9 @@ impl WorkVolume<'_> {
     ) -> Result<PathFollowed, Failure> {
         self.correct(mover, is_corrected)?;
         begun();
+        let takes = mover.engine().period().mul_f64(points.len() as f64);
+        let observer = self.core.observer();
+        observer.begins(Stage::Job, "volume", takes);
         let mut corrected = CorrectedPath::default();
         let mut last = None;
         let count = points.len();

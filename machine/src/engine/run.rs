@@ -277,6 +277,7 @@ impl Run<'_> {
         machine
             .devices
             .keep_looking(answered, true, &mut machine.notices);
+        machine.notices.lives(answered);
         self.machine.judge_alarms()?;
         let engine = &mut *self.engine;
         let late_answers = engine.timing.late_answers;

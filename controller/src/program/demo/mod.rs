@@ -9,7 +9,6 @@ pub(crate) mod emulation;
 pub(crate) mod stand;
 pub(crate) mod which;
 
-use std::io::IsTerminal;
 use std::time::Instant;
 
 use clap::Args;
@@ -60,9 +59,11 @@ fn on_stand(
     let (transport, patience) = emulated.connect(&loaded.config)?;
     loaded.patience = patience;
     let mut machine = Machine::new(&loaded, transport);
-    machine.observe(Box::new(Bars::new(
-        output.is_json() || !std::io::stderr().is_terminal(),
-    )));
+    let bars = match args.speed {
+        None => Bars::of_demonstration(output.is_json()),
+        Some(_) => Bars::new(output.is_json()),
+    };
+    machine.observe(Box::new(bars));
     stop_on_signals(&machine.stop_request())?;
     announce(args, &loaded, &emulated, output);
     let mut stand = Stand {
