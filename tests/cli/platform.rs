@@ -118,6 +118,35 @@ fn what_a_platform_measured_is_listed_rolled_back_and_made_into_pages() {
         check_says(&calibrated, &[&format!("<h2>Screw {axis}</h2>"), &id[..12]]);
     }
     check_says(&page(folder, &runs.zeroed), &["<h2>Zero</h2>"]);
+    is_fitted_again(folder, &runs, &newest);
+}
+
+/// What `fit` makes of the journal is what the calibration has made of it, but for what the camera does not repeat, which the
+/// strokes alone do not tell.
+fn is_fitted_again(folder: &Path, runs: &Runs, newest: &[(String, String)]) {
+    let words = ["fit", "screw", &runs.calibrated, "--lead-mm", "2"];
+    let fitted = truestage(folder, &words).with_code(0);
+    for (axis, id) in newest {
+        let shown = truestage(folder, &["cal", "show", "machine.toml", id]).with_code(0);
+        let stored = &shown["record"];
+        let fitted = &fitted["axes"][axis];
+        for (seen, key, per_si) in [
+            ("slope_um_per_mm", "slope_m_per_m", 1e3),
+            ("lost_motion_um", "lost_motion_m", 1e6),
+        ] {
+            let (again, stored) = (number(&fitted[seen]), number(&stored[key]) * per_si);
+            assert!(
+                (again - stored).abs() < 0.05,
+                "{axis} {seen}: {again}, stored {stored}"
+            );
+        }
+    }
+    let no_strokes = truestage(folder, &["fit", "screw", &runs.zeroed]);
+    assert_eq!(no_strokes.code, Some(2), "{no_strokes:?}");
+    assert!(
+        no_strokes.said.contains("a platform's `calibrate`"),
+        "{no_strokes:?}"
+    );
 }
 
 #[test]

@@ -63,6 +63,7 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         assert_eq!(calibrated["offsets"], serde_json::json!([0, 73, 162]));
         let id = text(&calibrated["calibration"]);
         is_shown(&bench, id);
+        is_fitted_again(&bench, id, text(&calibrated["journal"]));
 
         let verified = bench.run(&["verify", "--yes"]).with_code(0);
         assert!(number(&verified["as_found"]["largest_arcsec"]) > 8.0);
@@ -75,6 +76,51 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         }
         moves(&bench, id);
     }
+}
+
+/// What `fit` makes of the journal is what the calibration has made of it.
+fn is_fitted_again(bench: &Bench, id: &str, journal: &str) {
+    let fitted = bench.run_plainly(&["fit", "rotary", journal, "--amplification-limit", "5"]);
+    let fitted = fitted.with_code(0);
+    let shown = bench
+        .run_plainly(&["cal", "show", "machine.toml", id])
+        .with_code(0);
+    let of = |list: &serde_json::Value| -> Vec<f64> {
+        list.as_array()
+            .expect("a list")
+            .iter()
+            .map(number)
+            .collect()
+    };
+    let stored = of(&shown["record"]["table_error_rad"]);
+    let again = of(&fitted["table_error_arcsec"]);
+    assert_eq!((again.len(), stored.len()), (360, 360));
+    for (again, stored) in again.iter().zip(stored) {
+        let stored = stored.to_degrees() * 3600.0;
+        assert!((again - stored).abs() < 1e-6, "{again}, stored {stored}");
+    }
+    let saved = bench.run_plainly(&[
+        "fit",
+        "rotary",
+        journal,
+        "--amplification-limit",
+        "5",
+        "--save",
+        "machine.toml",
+    ]);
+    let saved = saved.with_code(0);
+    let shown = bench.run_plainly(&["cal", "show", "machine.toml", text(&saved["calibration"])]);
+    let instrument = &shown.with_code(0)["record"]["instrument"];
+    assert!(
+        instrument["name"].to_string().contains("GP-360"),
+        "{instrument}"
+    );
+    let refused = bench.run_plainly(&["fit", "rotary", journal, "--lines", "360"]);
+    assert!(
+        refused.said.contains("a journal has its own"),
+        "{refused:?}"
+    );
+    assert_eq!(refused.code, Some(2));
 }
 
 /// Nobody is there to turn the plate: nothing moves, nothing is written.

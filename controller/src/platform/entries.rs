@@ -1,8 +1,9 @@
 //! What a journal says of a platform.
 
 use compensator::platform::Pose;
+use compensator::screw::Stroke;
 use serde::{Deserialize, Serialize};
-use units::{Metres, Radians};
+use units::{Approach, Metres, Radians};
 
 /// A pose, metres and radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -67,6 +68,21 @@ pub struct StrokeEntry {
     pub pose: PoseRecord,
     /// Monotonic time of the machine, seconds.
     pub at_s: f64,
+}
+
+impl StrokeEntry {
+    /// As a model is fitted to it.
+    pub(crate) fn stroke(&self) -> Stroke {
+        let side = match self.approach {
+            '-' => Approach::Reverse,
+            _ => Approach::Forward,
+        };
+        Stroke {
+            approach: side,
+            stroke: Metres(self.stroke_m),
+            deviation: Metres(self.measured_m - self.stroke_m),
+        }
+    }
 }
 
 /// A pose that was looked at.

@@ -43,9 +43,9 @@ pub(crate) enum FitCommand {
         /// The data file.
         data: PathBuf,
     },
-    /// Ball screws, from columns axis,approach,stroke_um,deviation_um.
+    /// Ball screws, from columns axis,approach,stroke_um,deviation_um, or from the journal of a calibration.
     Screw(super::platform::fit::ScrewArgs),
-    /// A rotary table's error, from columns offset,line,deviation_arcsec.
+    /// A rotary table's error, from columns offset,line,deviation_arcsec, or from the journal of a calibration.
     Rotary(super::rotary::fit::RotaryArgs),
     /// The errors of three axes, from the journal of a calibration or from columns
     /// line,reads,x_mm,y_mm,z_mm,tool_x_mm,tool_y_mm,tool_z_mm,deviation,u.
@@ -326,6 +326,13 @@ pub(super) fn linear_axis(
 }
 
 fn hall(path: &Path, output: Output) -> Ended {
+    if is_journal(path) {
+        return Err(Failure::Usage {
+            what: format!("{}: a zero's journal has no whole sweep", name_of(path)),
+            help: "give the sweep that `plan zero` keeps (columns position_um,peak_v,slope_v)"
+                .into(),
+        });
+    }
     let series = HallSeries::from_csv(&read(path)?, &name_of(path))?;
     let estimate = fit_hall(&series).map_err(|source| Failure::Refine {
         axis: name_of(path),

@@ -62,6 +62,18 @@ pub(super) fn evaluate(
     Ok(at_table_positions(solution, common_phase(placed)))
 }
 
+/// The same of a run that was evaluated before: nothing is refused that was not then.
+#[cfg(feature = "program")]
+pub(crate) fn fit_whole(
+    axis: &str,
+    lines: u32,
+    options: &SolveOptions,
+    placed: &[Placed],
+) -> Result<Solution, RotaryFailure> {
+    let (solution, _) = fit(axis, lines, options, placed)?;
+    Ok(at_table_positions(solution, common_phase(placed)))
+}
+
 /// The solution, and the readings at their nominal positions that it was made from.
 pub(crate) fn fit(
     axis: &str,

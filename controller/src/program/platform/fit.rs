@@ -7,16 +7,17 @@ use compensator::screw::{
     self, FitError, FitOptions, Fitted, Limits, Rule, ScrewCompensation, ScrewModel, StrokeOutlier,
 };
 use compensator::screw::{AxisStrokes, ScatterParts, Stroke, StrokeSeries};
-use machine::records::{CalibrationRecord, short};
+use machine::records::{CalibrationRecord, read_journal, short};
 use serde_json::{Value, json};
 use units::{Approach, Metres, Short};
 
 use crate::platform::PlatformConfig;
 use crate::platform::PlatformFailure;
+use crate::platform::PlatformLog;
 use crate::platform::{ScrewContent, ScrewMethodName};
 use crate::program::budget;
 use crate::program::data_file::head_of;
-use crate::program::data_text::{name_of, read};
+use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::page::chart::{BLUE, ORANGE};
 use crate::program::page::compare::{Pair, overlaid};
@@ -30,7 +31,7 @@ use crate::{Failure, config};
 /// What `truestage fit screw` is told.
 #[derive(Debug, Args)]
 pub(crate) struct ScrewArgs {
-    /// The data file; an axis may have any number of rows.
+    /// The data file; an axis may have any number of rows. Or the journal of a `calibrate` (*.jsonl).
     data: PathBuf,
     /// The patent's means, or least squares over all strokes with forward and reverse apart.
     #[arg(long, value_enum, default_value_t = Method::LeastSquares)]
@@ -72,7 +73,7 @@ struct Estimated<'a> {
 
 pub(crate) fn run(args: &ScrewArgs, output: Output) -> Ended {
     let file = name_of(&args.data);
-    let series = StrokeSeries::from_csv(&read(&args.data)?, &file)?;
+    let series = series_of(&args.data, &file)?;
     if args.method == Method::Patent && args.lead_mm.is_some() {
         output.note("note: the patent's method has no periodic error; --lead-mm has no effect");
     }
@@ -112,6 +113,20 @@ pub(crate) fn run(args: &ScrewArgs, output: Output) -> Ended {
     }
     let value = json!({"method": args.method.name(), "axes": values});
     output.result(&lines.join("\n"), &value)
+}
+
+/// The strokes of a data file, or those that a calibration made.
+fn series_of(path: &Path, file: &str) -> Result<StrokeSeries, Failure> {
+    if !is_journal(path) {
+        return Ok(StrokeSeries::from_csv(&read(path)?, file)?);
+    }
+    let journal = read_journal::<PlatformLog>(path)?;
+    let strokes = journal.log.strokes.iter();
+    let strokes = strokes.map(|it| (it.axis.clone(), it.stroke()));
+    StrokeSeries::new(strokes.collect()).map_err(|source| Failure::Usage {
+        what: format!("{file}: {source}"),
+        help: "name the journal of a platform's `calibrate`".into(),
+    })
 }
 
 fn patent(strokes: &AxisStrokes) -> Result<Estimated<'_>, FitError> {

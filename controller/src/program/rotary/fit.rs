@@ -9,20 +9,23 @@ use compensator::rotary::{
     self, Criterion, Design, PlanError, Reading, Solution, SolveOptions,
     rms_amplification_of_a_pair, rms_amplification_of_all,
 };
-use machine::records::{CalibrationRecord, short};
+use machine::records::{CalibrationRecord, read_journal, short};
 use serde_json::json;
 use units::Radians;
 
 use crate::program::budget;
 use crate::program::data_file::rotary_head_of;
-use crate::program::data_text::{name_of, read};
+use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::page::chart::BLUE;
 use crate::program::page::compare::{Pair, overlaid};
 use crate::program::rotary::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
+use crate::rotary::PlateLog;
 use crate::rotary::RotaryContent;
 use crate::rotary::RotaryFailure;
+use crate::rotary::estimate::fit_whole as fit_placed;
+use crate::rotary::placed::Placed;
 use crate::rotary::settings::interpolation_of;
 use crate::{Failure, config};
 
@@ -58,7 +61,8 @@ enum CriterionName {
 /// What `truestage fit rotary` is told.
 #[derive(Debug, Args)]
 pub(crate) struct RotaryArgs {
-    /// The data file; line n of a placement with offset s is read at table position n + s.
+    /// The data file; line n of a placement with offset s is read at table position n + s. Or the journal of a
+    /// `calibrate` (*.jsonl), which knows the lines and the plate itself.
     data: PathBuf,
     /// Lines of the plate: the file cannot tell, as lines that were never read leave no row.
     #[arg(long)]
@@ -145,6 +149,9 @@ fn plan_text(design: &Design, pair: &Design) -> String {
 }
 
 pub(crate) fn fit(args: &RotaryArgs, output: Output) -> Ended {
+    if is_journal(&args.data) {
+        return of_journal(args, output);
+    }
     let file = name_of(&args.data);
     let series = RotarySeries::from_csv(&read(&args.data)?, &file, args.lines)?;
     let options = SolveOptions {
@@ -163,10 +170,46 @@ pub(crate) fn fit(args: &RotaryArgs, output: Output) -> Ended {
         place: file,
         source,
     })?;
-    let mut value = to_json::solution(&solution);
-    let mut text = solution_text(&solution);
+    told(args, args.plate.as_deref(), &solution, output)
+}
+
+/// The placements of a calibration that were read whole, evaluated as the calibration does.
+fn of_journal(args: &RotaryArgs, output: Output) -> Ended {
+    let own = [
+        ("--lines", args.lines.is_some()),
+        ("--plate", args.plate.is_some()),
+    ];
+    if let Some((option, _)) = own.into_iter().find(|it| it.1) {
+        return Err(Failure::Usage {
+            what: format!("{option}, and {} is a journal", name_of(&args.data)),
+            help: "leave it out: a journal has its own".into(),
+        });
+    }
+    let journal = read_journal::<PlateLog>(&args.data)?;
+    let Some(plan) = &journal.log.plan else {
+        return Err(Failure::Usage {
+            what: format!("{}: no plate was read in it", name_of(&args.data)),
+            help: "name the journal of a rotary table's `calibrate`".into(),
+        });
+    };
+    let placements = journal.log.placements.iter();
+    let placed: Vec<Placed> = placements
+        .map(|it| Placed::in_plan(it, &journal.log.sweeps, plan))
+        .collect();
+    let options = SolveOptions {
+        reading_noise: args.reading_noise_arcsec.map(noise).transpose()?,
+        amplification_max: args.amplification_limit,
+        ..SolveOptions::default()
+    };
+    let solution = fit_placed(&journal.header.axis, plan.lines, &options, &placed)?;
+    told(args, Some(&plan.plate), &solution, output)
+}
+
+fn told(args: &RotaryArgs, plate: Option<&str>, solution: &Solution, output: Output) -> Ended {
+    let mut value = to_json::solution(solution);
+    let mut text = solution_text(solution);
     if let Some(config) = &args.save {
-        let id = save(config, args, &solution)?;
+        let id = save(config, args, plate, solution)?;
         text += &format!(
             "\nstored as {} (use it with `truestage cal activate {} {}`)",
             short(&id),
@@ -239,7 +282,12 @@ fn name(reading: &Reading) -> String {
 }
 
 /// Stores a table measured elsewhere.
-fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, Failure> {
+fn save(
+    path: &Path,
+    args: &RotaryArgs,
+    plate: Option<&str>,
+    solution: &Solution,
+) -> Result<String, Failure> {
     let loaded = config::load(path)?;
     let axes = &loaded.config.rotary;
     let axis = match (&args.axis, axes.len()) {
@@ -260,8 +308,8 @@ fn save(path: &Path, args: &RotaryArgs, solution: &Solution) -> Result<String, F
         }
     };
     let mut head = rotary_head_of(&loaded, &axis, &args.data)?;
-    if let Some(plate) = &args.plate {
-        head.instrument.identity = core::mem::replace(&mut head.instrument.name, plate.clone());
+    if let Some(plate) = plate {
+        head.instrument.identity = core::mem::replace(&mut head.instrument.name, plate.into());
     }
     let drawn = interpolation_of(axes[&axis].compensation.as_ref());
     let content = RotaryContent::new(solution).with_budget(solution, drawn);
