@@ -44,6 +44,9 @@ pub struct ArrangementEntry {
     pub edge_m: f64,
     /// How far from its target a pose may be, metres, where that is judged.
     pub tolerance_m: Option<f64>,
+    /// What the configuration says of the camera, where its pictures are the measure; `None` in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_u: Option<PoseRecord>,
 }
 
 /// A stroke of one screw, seen by the camera.
@@ -95,6 +98,10 @@ pub struct PoseEntry {
     pub set_points_m: Vec<f64>,
     /// Where the camera saw it.
     pub seen: PoseRecord,
+    /// Standard uncertainty of each part of that, by the camera itself and by what its pictures do not repeat, those of the
+    /// zero among them; `None` where a single picture does not tell it, and in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seen_u: Option<PoseRecord>,
     /// From the start of the first screw to that of the last, seconds.
     pub skew_s: Option<f64>,
     /// Monotonic time of the machine, seconds.
@@ -108,6 +115,7 @@ impl PoseEntry {
             target: None,
             set_points_m: Vec::new(),
             seen: seen.into(),
+            seen_u: None,
             skew_s: None,
             at_s,
         }

@@ -29,6 +29,7 @@ impl AlignmentPlatform<'_> {
             axes: screws.iter().map(|it| it.axis.clone()).collect(),
             edge_m: Metres::from_mm(self.config.edge_mm).value(),
             tolerance_m: tolerance.map(Metres::value),
+            camera_u: tolerance.map(|_| self.camera_u().into()),
         }))?;
         Ok(journal)
     }

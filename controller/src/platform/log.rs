@@ -75,6 +75,7 @@ fn arrangement(read: &PlatformLog, it: &ArrangementEntry) -> Judged {
         })?;
     }
     number("edge_m", it.edge_m, &LENGTH_M)?;
+    u_of("camera_u", it.camera_u.as_ref())?;
     optional("tolerance_m", it.tolerance_m, &LENGTH_M)
 }
 
@@ -82,6 +83,24 @@ fn pose_of(place: &str, it: &PoseRecord) -> Judged {
     number(format_args!("{place}.x_m"), it.x_m, &PLACE_M)?;
     number(format_args!("{place}.y_m"), it.y_m, &PLACE_M)?;
     number(format_args!("{place}.angle_rad"), it.angle_rad, &ANGLE_RAD)
+}
+
+/// Of each part of a pose, where it is said.
+fn u_of(place: &str, it: Option<&PoseRecord>) -> Judged {
+    let Some(it) = it else {
+        return Ok(());
+    };
+    number(format_args!("{place}.x_m"), it.x_m, &ERROR_U_M)?;
+    number(format_args!("{place}.y_m"), it.y_m, &ERROR_U_M)?;
+    let angle = it.angle_rad;
+    number(format_args!("{place}.angle_rad"), angle, &ANGLE_RAD)?;
+    let (expected, seen) = (|| "0 or more".to_owned(), || format!("{angle:e}"));
+    is(
+        format_args!("{place}.angle_rad"),
+        angle >= 0.0,
+        expected,
+        seen,
+    )
 }
 
 fn arranged(read: &PlatformLog) -> Result<&ArrangementEntry, Unsound> {
@@ -118,6 +137,7 @@ fn pose(read: &PlatformLog, it: &PoseEntry) -> Judged {
     counted("set_points_m", it.set_points_m.len(), 0..=screws)?;
     numbers("set_points_m", &it.set_points_m, &PLACE_M)?;
     pose_of("seen", &it.seen)?;
+    u_of("seen_u", it.seen_u.as_ref())?;
     optional("skew_s", it.skew_s, &SECONDS)?;
     number("at_s", it.at_s, &SECONDS)
 }

@@ -72,16 +72,23 @@ impl AlignmentPlatform<'_> {
         })
     }
 
+    /// How uncertain the camera's own scale and teaching make what it sees, by the configuration.
+    pub(super) fn camera_u(&self) -> Pose {
+        let camera = &self.core.config.camera[&self.config.camera];
+        let length = Metres::from_um(camera.standard_uncertainty_um);
+        Pose {
+            x: length,
+            y: length,
+            angle: Radians::from_arcsec(camera.standard_uncertainty_arcsec),
+        }
+    }
+
     /// The same, with how uncertain it is: by the camera's own scale and teaching, and by what the pictures scatter,
     /// also those of the zero.
     pub(super) fn look_closely(&mut self) -> Result<SeenPose, Failure> {
         let Seen { pose, covariance } = self.camera_sees(self.config.exposures)?;
-        let own = &self.core.config.camera[&self.config.camera];
-        let own = [
-            own.standard_uncertainty_um * 1e-6,
-            own.standard_uncertainty_um * 1e-6,
-            Radians::from_arcsec(own.standard_uncertainty_arcsec).value(),
-        ];
+        let own = self.camera_u();
+        let own = [own.x.value(), own.y.value(), own.angle.value()];
         let share = 1.0 + 1.0 / f64::from(DATUM_LOOKS);
         let uncertainty = covariance.map(|of_mean| {
             let u = |at: usize| hypot(own[at], (of_mean[at][at] * share).sqrt());

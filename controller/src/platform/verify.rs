@@ -12,6 +12,7 @@ use crate::failure::Failure;
 use crate::platform::PoseEntry;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::look::SeenPose;
 use crate::platform::state::{difference, largest_error};
 use crate::platform::{AlignConfig, PlatformConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
@@ -166,12 +167,14 @@ impl AlignmentPlatform<'_> {
             } else {
                 self.go_to_pose(*target, Correction::Off)?
             };
-            let seen = self.measure_pose()?;
+            let SeenPose { pose, uncertainty } = self.look_closely()?;
+            let seen = self.since_zero(pose)?;
             let skew_s = moved.skew.map(|it| it.as_secs_f64());
             journal.write(&PlatformEntry::Pose(PoseEntry {
                 target: Some((*target).into()),
                 set_points_m: moved.set_points.iter().map(|(_, at)| at.value()).collect(),
                 seen: seen.into(),
+                seen_u: uncertainty.map(Into::into),
                 skew_s,
                 at_s: self.core.now().seconds(),
             }))?;

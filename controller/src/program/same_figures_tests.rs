@@ -562,6 +562,7 @@ fn check_platform_verification(verified: &PlatformVerified) {
             (&page, "skew of the starts (ms) "),
         ],
     );
+    check_seen(&page, &verified.journal);
     let poses = list(&json, "/poses");
     everywhere(poses.len() as f64, &[(&text, " over "), (&page, " poses ")]);
     let rows = behind(&page, "skew (ms)", poses.len() * 9);
@@ -569,6 +570,42 @@ fn check_platform_verification(verified: &PlatformVerified) {
         check("error of a pose", at(pose, "/error_um"), row[7]);
         check("skew of a pose", at(pose, "/skew_ms"), row[8]);
     }
+}
+
+/// What the page states of the errors of poses: the largest of what the journal says of each, and its two parts.
+#[track_caller]
+fn check_seen(page: &str, journal: &Path) {
+    let text = std::fs::read_to_string(journal).unwrap();
+    let entries = text.lines().map(|it| serde_json::from_str(it).unwrap());
+    let entries: Vec<Value> = entries.collect();
+    let arrangement = entries.iter().find(|it| it["entry"] == "arrangement");
+    let arrangement = arrangement.unwrap();
+    let edge = at(arrangement, "/edge_m");
+    let parts = |of: &Value, place: &str| {
+        let part = |name: &str| at(of, &format!("{place}/{name}"));
+        [part("x_m"), part("y_m"), part("angle_rad") * edge]
+    };
+    let camera = parts(arrangement, "/camera_u");
+    let poses = entries.iter().filter(|it| it["entry"] == "pose");
+    let (mut most, mut scatter) = (0.0_f64, 0.0_f64);
+    for seen in poses.map(|it| parts(it, "/seen_u")) {
+        for (u, own) in seen.into_iter().zip(camera) {
+            assert!(u > own && own > 0.0, "{u} with the camera's {own}");
+            most = most.max(2.0 * u);
+            scatter = scatter.max((u * u - own * own).sqrt());
+        }
+    }
+    assert!(!page.contains("NOT STATED"), "{page}");
+    everywhere(
+        most * UM,
+        &[(page, "of the error of a pose: U (k = 2) up to ")],
+    );
+    everywhere(camera[0] * UM, &[(page, "as configured, u ")]);
+    everywhere(camera[2] * UM, &[(page, "″ (")]);
+    everywhere(
+        scatter * UM,
+        &[(page, "those of the zero included, u up to ")],
+    );
 }
 
 struct Hand {

@@ -1,10 +1,10 @@
 //! The head of the page of a platform's run.
 
 use machine::records::{ReadJournal, short};
-use units::Metres;
+use units::{Metres, Radians};
 
 use super::{Named, Visit};
-use crate::platform::PlatformLog;
+use crate::platform::{PlatformLog, PoseRecord};
 use crate::program::page::head::{Fact, IN_USE, Made, Stated, facts_of};
 use crate::program::text::verdict;
 use crate::store::budget::PlacesBudgetRecord;
@@ -23,7 +23,7 @@ pub(crate) fn head(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -
             }],
             false => Vec::new(),
         },
-        uncertainty: uncertainty(calibrations),
+        uncertainty: uncertainty(calibrations).or_else(|| seen(journal)),
         verdict: judged(journal),
         conformity: Some((
             "seen by a camera in the plane, which no standard describes".into(),
@@ -68,6 +68,41 @@ fn uncertainty(calibrations: &[Named]) -> Option<String> {
         Metres(most).um()
     ))
 }
+
+/// Of the error of a pose that was verified, at its least certain part, with where it comes from.
+fn seen(journal: &ReadJournal<PlatformLog>) -> Option<String> {
+    let arrangement = journal.log.arrangement.as_ref()?;
+    let (camera, edge) = (arrangement.camera_u?, arrangement.edge_m);
+    let poses = journal.log.poses.iter().filter(|it| it.target.is_some());
+    let told: Option<Vec<PoseRecord>> = poses.map(|it| it.seen_u).collect();
+    let Some(told) = told.filter(|it| !it.is_empty()) else {
+        return Some(SINGLE.into());
+    };
+    let parts = |it: &PoseRecord| [it.x_m, it.y_m, it.angle_rad * edge];
+    let largest = |it: [f64; 3]| it.into_iter().fold(0.0, f64::max);
+    let own = parts(&camera);
+    let scatter = |it: &PoseRecord| {
+        let all = parts(it);
+        let repeated = |at: usize| all[at] * all[at] - own[at] * own[at];
+        largest([0, 1, 2].map(|at| repeated(at).max(0.0).sqrt()))
+    };
+    let expanded = 2.0 * told.iter().map(|it| largest(parts(it))).fold(0.0, f64::max);
+    let repeats = told.iter().map(scatter).fold(0.0, f64::max);
+    Some(format!(
+        "of the error of a pose: U (k = 2) up to {:.3} µm. It has the camera's own scale and teaching as configured, \
+         u {:.3} µm and {:.3}″ ({:.3} µm at the edge), and what its pictures do not repeat, those of the zero included, \
+         u up to {:.3} µm",
+        Metres(expanded).um(),
+        Metres(camera.x_m).um(),
+        Radians(camera.angle_rad).arcsec(),
+        Metres(own[2]).um(),
+        Metres(repeats).um(),
+    ))
+}
+
+/// Why there is no uncertainty.
+const SINGLE: &str = "NOT STATED: a single picture of each pose does not say what the camera repeats; take several \
+                      (`exposures` of [platform])";
 
 fn judged(journal: &ReadJournal<PlatformLog>) -> Option<(String, bool)> {
     let visit = (String::new(), journal);
