@@ -20,6 +20,13 @@ pub struct Cause {
     pub exit_code: u8,
 }
 
+impl Cause {
+    /// Whether something took longer than it may: what ends so has timed out.
+    pub(crate) fn is_overdue(&self) -> bool {
+        self.code == Code::Overdue
+    }
+}
+
 /// Who stopped something, and when.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Stopped {
@@ -252,6 +259,8 @@ pub enum RunState {
     Stopped,
     /// It has no result.
     Failed,
+    /// A step of it took longer than it may, and was stopped.
+    TimedOut,
 }
 
 impl RunState {
@@ -259,7 +268,7 @@ impl RunState {
     pub const fn is_end(self) -> bool {
         match self {
             Self::Planned | Self::Running | Self::Stopping | Self::Paused => false,
-            Self::Done | Self::Stopped | Self::Failed => true,
+            Self::Done | Self::Stopped | Self::Failed | Self::TimedOut => true,
         }
     }
 }

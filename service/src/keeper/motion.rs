@@ -38,6 +38,16 @@ pub(super) enum End {
     TimedOut(Cause),
 }
 
+impl End {
+    /// Of what `cause` ended.
+    fn by(cause: Cause) -> Self {
+        match cause.is_overdue() {
+            true => Self::TimedOut(cause),
+            false => Self::Failed(cause),
+        }
+    }
+}
+
 /// How far a motion is.
 #[derive(Clone, Debug)]
 enum Phase {
@@ -107,6 +117,12 @@ impl Motion {
     fn has_procedure(&self) -> bool {
         let together = self.together.as_ref();
         together.is_some_and(Together::is_under_way)
+    }
+
+    /// Whether its procedure has ended before it was made.
+    fn is_broken_off(&self) -> bool {
+        let together = self.together.as_ref();
+        together.is_some_and(Together::is_broken_off)
     }
 }
 
@@ -351,10 +367,14 @@ impl Keeper {
         }
     }
 
-    /// Every motion fails.
+    /// Every motion fails. What was overdue is the one that a procedure made, if there is one: others were in time.
     pub(super) fn fail_motions(&mut self, machine: &Machine, cause: &Cause) {
-        while !self.motions.active.is_empty() {
-            self.finish_motion(machine, 0, End::Failed(cause.clone()));
+        while let Some(motion) = self.motions.active.first() {
+            let end = match motion.is_broken_off() {
+                true => End::by(cause.clone()),
+                false => End::Failed(cause.clone()),
+            };
+            self.finish_motion(machine, 0, end);
         }
     }
 

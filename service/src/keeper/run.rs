@@ -248,7 +248,11 @@ impl Keeper {
             }),
             RunState::Running => self.stop_run(machine, &stopped),
             // A level: it stays.
-            RunState::Stopping | RunState::Done | RunState::Stopped | RunState::Failed => {}
+            RunState::Stopping
+            | RunState::Done
+            | RunState::Stopped
+            | RunState::Failed
+            | RunState::TimedOut => {}
         }
         Ok(())
     }
@@ -372,7 +376,10 @@ impl Keeper {
         }
         self.free_axes_of(id);
         self.change_run(id, |view| {
-            view.state = RunState::Failed;
+            view.state = match cause.is_overdue() {
+                true => RunState::TimedOut,
+                false => RunState::Failed,
+            };
             view.question = None;
             view.cause = Some(cause.clone());
         });

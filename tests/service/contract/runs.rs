@@ -1,11 +1,17 @@
 //! Runs: planned, started, answered meanwhile, stopped.
 
 use core::time::Duration;
+use std::path::Path;
 
-use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, StopMode};
+use mock_bus::fault::Fault;
+use service::{
+    AxisState, Code, MachineState, MotionState, RunKind, RunRequest, RunState, StopMode,
+};
 use tests::{Edit, LINEAR};
 
-use super::{SEED, anna, bert, compensated, each, patient, with_stage, with_zeroed_stage};
+use super::{
+    Bed, SEED, anna, bert, compensated, each, patient, with_stage, with_zeroed_stage, zeroed,
+};
 use crate::client::PATIENCE;
 use crate::stage::Stage;
 
@@ -132,6 +138,24 @@ fn a_stop_by_anybody_ends_a_run_at_once_and_names_who() {
             bed.client.zero(&anna(), None);
         });
     }
+}
+
+/// The fourth end: a step that takes longer than it may.
+#[test]
+fn a_run_whose_axis_does_not_come_to_rest_is_stopped_and_timed_out() {
+    let new = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, short);
+    let body = |bed: &Bed<'_>| {
+        let shaking = Fault::Vibration { amplitude_um: 5.0 };
+        bed.stage.inject(shaking);
+        let id = bed.run_of(RunKind::Calibrate);
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::TimedOut, "{run:?}");
+        assert_eq!(run.cause.expect("it did not end").code, Code::Overdue);
+        // Whatever did not answer may still move: as at the command line, everything is stopped.
+        assert_eq!(bed.client.machine().state, MachineState::ErrorStop);
+        assert_eq!(bed.client.axis("x").unwrap().used_by, None);
+    };
+    each(new, zeroed(body));
 }
 
 #[test]

@@ -263,6 +263,30 @@ fn a_platform_that_is_stopped_under_way_stands_and_says_who_did_it() {
     });
 }
 
+/// Line 1, the fourth end: what its procedure waits for longer than it may.
+#[test]
+fn a_pose_that_takes_too_long_has_timed_out_and_what_is_queued_has_failed() {
+    let hasty = |text: String| {
+        text.replace("speed_mm_per_s = 10.0  ", "speed_mm_per_s = 0.5  ")
+            .replace("move_timeout_s = 10.0", "move_timeout_s = 2.0")
+    };
+    let new = move |rig, folder: &Path| Stage::new(rig, (UVW, SEED), folder, hasty);
+    let body = |bed: &Bed<'_>| {
+        let id = bed.begin(&pose(1.4, 1.4, 0.0));
+        let queued = bed.begin(&MoveRequest {
+            if_moving: IfMoving::Queue,
+            ..pose(0.0, 0.0, 0.0)
+        });
+        let view = bed.ended(&id);
+        assert_eq!(view.state, MotionState::TimedOut, "{view:?}");
+        assert_eq!(view.cause.expect("it was late").code, Code::Overdue);
+        let view = bed.ended(&queued);
+        assert_eq!(view.state, MotionState::Failed, "{view:?}");
+        assert_eq!(bed.client.machine().state, MachineState::ErrorStop);
+    };
+    each(new, zeroed(body));
+}
+
 /// Three axes whose errors are known, and what their detectors read.
 fn with_known_volume(body: impl Fn(&Bed<'_>)) {
     let mut before = Volume::zeroed(SEED, quick, |text| text);

@@ -184,7 +184,7 @@ fn run_line(run: &Value, looks: Looks) -> Line<'static> {
     );
     let state = text(&run["state"]);
     let looks_of_state = match state.as_str() {
-        "failed" => looks.bad,
+        "failed" | "timed_out" => looks.bad,
         "running" => looks.good,
         _ => Style::new(),
     };

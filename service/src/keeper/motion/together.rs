@@ -54,6 +54,11 @@ impl Together {
         matches!(self.progress, Progress::UnderWay)
     }
 
+    /// Whether its procedure has ended before the move was made.
+    pub(super) const fn is_broken_off(&self) -> bool {
+        matches!(self.progress, Progress::Over { moved: None, .. })
+    }
+
     /// What it came to, where it was made to its end.
     pub(super) const fn moved(&self) -> Option<&GroupMoved> {
         match &self.progress {
@@ -248,7 +253,7 @@ impl Keeper {
     pub(crate) fn motion_refused(&mut self, machine: &mut Machine, id: &str, cause: Cause) {
         let mut active = self.motions.active.iter();
         if let Some(number) = active.position(|it| *it.id == *id) {
-            self.stop_motion(machine, number, End::Failed(cause));
+            self.stop_motion(machine, number, End::by(cause));
         }
     }
 
