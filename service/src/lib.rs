@@ -42,7 +42,7 @@ pub use request::{
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{
-    AxisState, AxisView, CalibrationView, Cause, DepartureView, Event, GroupView, JournalView,
-    LeaseView, Leased, LegView, MachineState, MachineView, MotionState, MotionView, QuestionView,
+    AxisState, AxisView, CalibrationView, Cause, ChangeView, ChosenView, DepartureView, Event,
+    GroupView, JournalView, LeaseView, Leased, LegView, MachineState, MachineView, MotionState, MotionView, QuestionView,
     RunPlanView, RunState, RunView, Stopped, ToldView,
 };

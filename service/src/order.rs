@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tokio::sync::oneshot;
-use truestage::runs::JudgedPath;
+use truestage::runs::{Change, Choice, JudgedPath};
 
 use crate::problem::Problem;
 use crate::request::{
@@ -63,15 +63,6 @@ pub(crate) enum Order {
     End,
 }
 
-/// Which calibration is used.
-#[derive(Clone, Debug)]
-pub(crate) enum Choice {
-    /// This one, by the beginning of its name.
-    Activate(String),
-    /// The one that this axis used before.
-    Rollback(String),
-}
-
 impl Order {
     /// Whether only the holder of the lease may ask for it.
     pub(crate) const fn needs_lease(&self) -> bool {
@@ -102,8 +93,10 @@ impl Order {
 pub(crate) enum Answer {
     /// It is done, or goes on under its name.
     Done,
-    /// The motion that a jog is, or the axis whose calibration was chosen.
+    /// The motion that a jog is.
     Named(String),
+    /// What is used from now on, and by which axes.
+    Chosen(Vec<Change>, Vec<String>),
     /// The lease.
     Leased(Leased),
 }

@@ -15,7 +15,7 @@ use std::thread::{self, JoinHandle};
 use machine::attend;
 use machine::records::Store;
 use triple_buffer::Input;
-use truestage::runs::{Found, Group, Teller};
+use truestage::runs::{Choice, Found, Group, Teller};
 use truestage::{Failure, Machine, groups};
 use wire::cia402::PowerState;
 
@@ -23,7 +23,7 @@ use crate::desk::{Desk, Page, PathJudges};
 use crate::keeper::{Attending, Job, Keeper, Mechanics, Mode, RunTask, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
 use crate::manager::{Manager, Watch};
-use crate::order::{Answer, Choice, Letter, Reply};
+use crate::order::{Answer, Letter, Reply};
 use crate::problem::Problem;
 use crate::request::RunKind;
 use crate::scribe::Scribe;
@@ -308,28 +308,15 @@ impl Kept {
 
     /// Another calibration is used from now on; nothing moves.
     fn choose(&mut self, choice: &Choice, by: &str) -> Result<Answer, Problem> {
-        let (axis, named) = self.chosen_by(choice).map_err(Problem::from)?;
-        self.keeper.borrow().require_own_calibration(&axis)?;
-        let group = self.keeper.borrow().own_group(&axis)?;
-        let machine = &mut self.machine;
-        let used = group.choose(machine, &self.store, named.as_deref());
-        let id = used.map_err(Problem::from)?;
-        let mechanics = Mechanics::of(machine, &axis).map_err(Problem::from)?;
+        let groups = groups(self.machine.config());
+        let group = Group::chosen(&groups, &self.store, choice)?;
+        self.keeper.borrow().require_all_free(group)?;
+        let changes = group.choose(&mut self.machine, &self.store, choice)?;
+        self.load_group(group);
         let mut keeper = self.keeper.borrow_mut();
-        keeper.set_mechanics(&axis, mechanics, in_use(&self.store, Some(&id)));
-        keeper.chosen(machine, &axis, &id, by);
-        Ok(Answer::Named(axis))
-    }
-
-    /// Of which axis, and which one when that is said.
-    fn chosen_by(&self, choice: &Choice) -> Result<(String, Option<String>), Failure> {
-        match choice {
-            Choice::Rollback(axis) => Ok((axis.clone(), None)),
-            Choice::Activate(prefix) => {
-                let id = self.store.resolve(prefix)?;
-                Ok((self.store.glance(&id)?.head.axis, Some(id)))
-            }
-        }
+        keeper.plan_anew(&mut self.machine);
+        keeper.chosen(&self.machine, group, &changes, by);
+        Ok(Answer::Chosen(changes, group.axes.clone()))
     }
 
     /// Uses the active calibration of each axis, and says where one cannot be used; what runs would do depends on
@@ -337,26 +324,30 @@ impl Kept {
     fn load_courses(&mut self) {
         let groups = self.keeper.borrow().groups();
         for group in groups {
-            if !group.parts.is_empty() {
-                let judge = group.judge(&mut self.machine, &self.store);
-                let mut keeper = self.keeper.borrow_mut();
-                keeper.set_judge(&group.name, judge.map_err(Problem::from));
-            }
-            let (in_use, warning) = match group.load(&mut self.machine, &self.store) {
-                Ok(in_use) => (in_use, None),
-                Err(failure) => (Vec::new(), Some(failure)),
-            };
-            for axis in &group.axes {
-                let id = in_use.iter().find(|it| it.0 == *axis);
-                let id = id.and_then(|it| it.1.as_deref());
-                self.set_mechanics(axis, id);
-            }
-            if let Some(failure) = warning {
-                let what = format!("{}: its calibration is not used: {failure}", called(&group));
-                self.keeper.borrow_mut().warn(&what);
-            }
+            self.load_group(&group);
         }
         self.keeper.borrow_mut().plan_anew(&mut self.machine);
+    }
+
+    fn load_group(&mut self, group: &Group) {
+        if !group.parts.is_empty() {
+            let judge = group.judge(&mut self.machine, &self.store);
+            let mut keeper = self.keeper.borrow_mut();
+            keeper.set_judge(&group.name, judge.map_err(Problem::from));
+        }
+        let (in_use, warning) = match group.load(&mut self.machine, &self.store) {
+            Ok(in_use) => (in_use, None),
+            Err(failure) => (Vec::new(), Some(failure)),
+        };
+        for axis in &group.axes {
+            let id = in_use.iter().find(|it| it.0 == *axis);
+            let id = id.and_then(|it| it.1.as_deref());
+            self.set_mechanics(axis, id);
+        }
+        if let Some(failure) = warning {
+            let what = format!("{}: its calibration is not used: {failure}", called(group));
+            self.keeper.borrow_mut().warn(&what);
+        }
     }
 
     fn set_mechanics(&mut self, axis: &str, id: Option<&str>) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use truestage::runs::JudgedPath;
+use truestage::runs::{Change, JudgedPath};
 use utoipa::ToSchema;
 
 use crate::problem::Code;
@@ -473,6 +473,41 @@ pub struct CalibrationView {
     pub summary: String,
     /// Whether it is in use.
     pub active: bool,
+}
+
+/// What is used from now on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ChosenView {
+    /// What was chosen, and what goes with it.
+    pub changes: Vec<ChangeView>,
+    /// The axes that are corrected by it.
+    pub axes: Vec<AxisView>,
+}
+
+/// What one of the calibrations in use is from now on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct ChangeView {
+    /// Of which axis; of three axes `volume`, `volume-references`, `volume-first-memory` or `volume-second-memory`.
+    pub of: String,
+    /// Its name; null: none is in use.
+    pub id: Option<String>,
+    /// Whether it is the one that was used before.
+    pub is_earlier: bool,
+}
+
+impl From<Change> for ChangeView {
+    fn from(change: Change) -> Self {
+        let Change {
+            pointer,
+            id,
+            is_earlier,
+        } = change;
+        Self {
+            of: pointer,
+            id,
+            is_earlier,
+        }
+    }
 }
 
 /// Something that happened.

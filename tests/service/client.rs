@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use service::{
-    AnswerRequest, AxisView, CalibrationView, Caller, Desk, Event, JogRequest, LeaseRequest,
+    AnswerRequest, AxisView, CalibrationView, Caller, ChosenView, Desk, Event, JogRequest, LeaseRequest,
     Leased, MachineView, MotionView, MoveRequest, Problem, RunKind, RunRequest, RunState, RunView,
     StopMode,
 };
@@ -41,8 +41,8 @@ pub(crate) trait Client {
     fn lease(&self, who: &Caller, request: &LeaseRequest) -> Result<Leased, Problem>;
     fn release(&self, who: &Caller) -> Result<(), Problem>;
     fn calibrations(&self) -> Vec<CalibrationView>;
-    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem>;
-    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem>;
+    fn activate(&self, who: &Caller, id: &str) -> Result<ChosenView, Problem>;
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<ChosenView, Problem>;
     fn axis(&self, name: &str) -> Result<AxisView, Problem>;
     fn machine(&self) -> MachineView;
     fn events(&self, after: u64) -> Vec<Event>;
@@ -172,14 +172,14 @@ impl Client for InProcess {
         self.desk.calibrations().expect("they can be read")
     }
 
-    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+    fn activate(&self, who: &Caller, id: &str) -> Result<ChosenView, Problem> {
         let _passing = self.gate.pass();
-        self.desk.activate(who, id).map(|_| ())
+        self.desk.activate(who, id)
     }
 
-    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem> {
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<ChosenView, Problem> {
         let _passing = self.gate.pass();
-        self.desk.rollback(who, axis).map(|_| ())
+        self.desk.rollback(who, axis)
     }
 
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {

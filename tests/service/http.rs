@@ -275,19 +275,19 @@ impl Client for Http {
         self.get("/v1/calibrations").expect("they can be read")
     }
 
-    fn activate(&self, who: &Caller, id: &str) -> Result<(), Problem> {
+    fn activate(&self, who: &Caller, id: &str) -> Result<ChosenView, Problem> {
         let answer = self.post(
             who,
             &format!("/v1/calibrations/{id}/activate"),
             "",
             &json!({}),
         );
-        answer.read::<AxisView>().map(|_| ())
+        answer.read()
     }
 
-    fn rollback(&self, who: &Caller, axis: &str) -> Result<(), Problem> {
+    fn rollback(&self, who: &Caller, axis: &str) -> Result<ChosenView, Problem> {
         let answer = self.post(who, "/v1/calibrations/rollback", "", &json!({"axis": axis}));
-        answer.read::<AxisView>().map(|_| ())
+        answer.read()
     }
 
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {

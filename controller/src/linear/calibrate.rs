@@ -120,31 +120,8 @@ impl LinearStage<'_> {
         Ok(Some(id))
     }
 
-    /// Uses calibration `id` from now on, now and after the next start; nothing moves, and the one used before
-    /// stays in the history.
-    ///
-    /// # Errors
-    /// As [`LinearStage::load_active`]; the calibration used before is used still.
-    pub fn activate(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
-        let usable = self.usable(store, id)?;
-        store.activate(self.axis, id)?;
-        self.use_calibration(usable);
-        Ok(())
-    }
-
-    /// Uses the calibration that was used before; returns its name.
-    ///
-    /// # Errors
-    /// When there is none; as [`LinearStage::activate`].
-    pub fn rollback(&mut self, store: &Store) -> Result<String, Failure> {
-        let earlier = store.earlier(self.axis)?;
-        let usable = self.usable(store, &earlier)?;
-        store.rollback(self.axis)?;
-        self.use_calibration(usable);
-        Ok(earlier)
-    }
-
-    fn usable(&self, store: &Store, id: &str) -> Result<Usable, Failure> {
+    /// What `id` corrects, if it can be used here.
+    pub(super) fn usable(&self, store: &Store, id: &str) -> Result<Usable, Failure> {
         let record = store.load::<LinearContent>(id)?;
         record.head.belongs_to(
             id,

@@ -9,7 +9,7 @@ use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::linear::{LinearTeller, VerifyOptions};
 use crate::run::missing;
-use crate::runs::{Found, Group, GroupRuns, Planned, Task, Travel, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -19,7 +19,8 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
-    choose: Some(choose),
+    with_companions: |_, chosen| Ok(chosen),
+    usable,
     paths: None,
     moves: None,
 };
@@ -127,15 +128,11 @@ fn load(
     Ok(vec![(axis.to_owned(), id)])
 }
 
-fn choose(
-    machine: &mut Machine,
-    store: &Store,
-    axis: &str,
-    id: Option<&str>,
-) -> Result<String, Failure> {
-    let mut own = machine.linear(axis)?;
-    match id {
-        Some(id) => own.activate(store, id).map(|()| id.to_owned()),
-        None => own.rollback(store),
+fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
+    for change in changes {
+        if let Some(id) = &change.id {
+            machine.linear(&change.pointer)?.usable(store, id)?;
+        }
     }
+    Ok(())
 }

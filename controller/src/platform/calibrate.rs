@@ -14,6 +14,7 @@ use units::{Approach, Metres};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::handle::no_such_axis;
 use crate::platform::config::ScrewMethodName as Method;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
@@ -390,14 +391,7 @@ impl AlignmentPlatform<'_> {
         for (at, axis) in axes.into_iter().enumerate() {
             let id = store.active(&axis)?.current;
             if let Some(id) = &id {
-                let record = store.load::<ScrewContent>(id)?;
-                record.head.belongs_to(
-                    id,
-                    &self.core.this_machine(&axis),
-                    self.core.config_hash,
-                )?;
-                let model = record.content.model();
-                let compensation = self.prepare_screw(at, model)?;
+                let compensation = self.usable(store, &axis, id)?;
                 let state = &mut self.state.screws[at];
                 state.compensation = Some(compensation);
                 state.calibration = Some(id.clone());
@@ -405,6 +399,27 @@ impl AlignmentPlatform<'_> {
             loaded.push((axis, id));
         }
         Ok(loaded)
+    }
+
+    /// What the calibration `id` of the screw `axis` corrects, if it can be used here.
+    ///
+    /// # Errors
+    /// When it is damaged, of another kind, belongs to another machine or breaks a limit.
+    pub(super) fn usable(
+        &self,
+        store: &Store,
+        axis: &str,
+        id: &str,
+    ) -> Result<ScrewCompensation, Failure> {
+        let mut screws = self.state.screws.iter();
+        let at = screws.position(|it| it.axis == axis);
+        let known = || self.state.screws.iter().map(|it| it.axis.clone());
+        let at = at.ok_or_else(|| no_such_axis(axis, &known().collect::<Vec<_>>()))?;
+        let record = store.load::<ScrewContent>(id)?;
+        record
+            .head
+            .belongs_to(id, &self.core.this_machine(axis), self.core.config_hash)?;
+        self.prepare_screw(at, record.content.model())
     }
 }
 

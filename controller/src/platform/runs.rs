@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::platform::target::parts;
 use crate::platform::together::MOVES;
 use crate::platform::{PlatformFailure, PlatformTeller};
-use crate::runs::{Found, Group, GroupRuns, Moved, Planned, Task, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Moved, Planned, Task, Work};
 
 /// What its screws are called together.
 const WHOLE: &str = "platform";
@@ -23,19 +23,23 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
-    choose: None,
+    with_companions: |_, chosen| Ok(chosen),
+    usable,
     paths: None,
     moves: Some(&MOVES),
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {
     let group = config.platform.iter().map(|platform| {
-        let screws = platform.actuator.iter();
+        let screws = platform.actuator.iter().map(|it| it.axis.clone());
+        let screws: Vec<_> = screws.collect();
         Group {
             name: WHOLE.to_owned(),
-            axes: screws.map(|it| it.axis.clone()).collect(),
+            axes: screws.clone(),
             moved: Moved::Together,
             parts: parts(),
+            // Each screw has its own model; they go back together.
+            pointers: screws,
             journals: WHOLE.to_owned(),
             runs: &RUNS,
         }
@@ -141,4 +145,14 @@ fn load(
     _: &str,
 ) -> Result<Vec<(String, Option<String>)>, Failure> {
     machine.platform()?.load_active(store)
+}
+
+fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
+    let platform = machine.platform()?;
+    for change in changes {
+        if let Some(id) = &change.id {
+            platform.usable(store, &change.pointer, id)?;
+        }
+    }
+    Ok(())
 }

@@ -6,14 +6,16 @@ use clap::Subcommand;
 use machine::records::{Glance, Lease, Store, short};
 use serde_json::{Value, json};
 
-use crate::config::Loaded;
+use crate::groups;
 use crate::program::belongs::head_of;
 use crate::program::cal_page;
 use crate::program::controls::export::{self, ExportArgs};
 use crate::program::controls::import::{self, ImportArgs};
+use crate::program::kept::or_by_its_service;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
+use crate::runs::{Change, Choice, changes_of, chosen_of, write};
 use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
@@ -54,7 +56,8 @@ pub(crate) enum CalCommand {
     Rollback {
         /// The machine's configuration.
         config: PathBuf,
-        /// Which axis; `platform` for all screws of one at once.
+        /// Which axis; `platform` for all screws of one at once, `volume` for the errors of three axes and what counts
+        /// from them.
         #[arg(long)]
         axis: String,
     },
@@ -74,8 +77,12 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
             after,
             page,
         } => diff(&opened(config)?, [before, after], page.as_deref(), output),
-        CalCommand::Activate { config, id } => activate(config, id, output),
-        CalCommand::Rollback { config, axis } => rollback(config, axis, output),
+        CalCommand::Activate { config, id } => {
+            chosen(config, &Choice::Activate(id.clone()), output)
+        }
+        CalCommand::Rollback { config, axis } => {
+            chosen(config, &Choice::Rollback(axis.clone()), output)
+        }
         CalCommand::Export(args) => export::run(args, output),
         CalCommand::Import(args) => import::run(args, put_into_use, output),
     }
@@ -205,66 +212,81 @@ pub(crate) fn compared(
     Ok((lines.join("\n"), json!({"changes": values})))
 }
 
-fn activate(path: &Path, id: &str, output: Output) -> Ended {
-    let (axis, id) = put_into_use(path, id)?;
-    let text = format!("axis {axis}: {} is in use", short(&id));
-    output.result(&text, &json!({"axis": axis, "active": id}))
+/// What is used from now on: done here, or by the service that keeps the machine.
+fn chosen(path: &Path, choice: &Choice, output: Output) -> Ended {
+    let here = choose(path, choice).and_then(|changes| {
+        let used = changes.iter().map(|it| Used {
+            pointer: &it.pointer,
+            id: it.id.as_deref(),
+            is_earlier: it.is_earlier,
+        });
+        told(choice, &used.collect::<Vec<_>>(), output)
+    });
+    or_by_its_service(here, |service| service.choose(choice, output))
 }
 
-/// The axis and the whole name. The stage and the configuration are checked here; the drive itself when it is used.
-fn put_into_use(path: &Path, id: &str) -> Result<(String, String), Failure> {
+/// Chooses while nobody has the machine. The stage and the configuration are checked here; the drive itself when it
+/// is used.
+fn choose(path: &Path, choice: &Choice) -> Result<Vec<Change>, Failure> {
     let loaded = config::load(path)?;
     let store = loaded.config.machine.store();
     // Whoever measures with a calibration must find it there to the end.
-    let _lease = Lease::take(&store, "cal activate")?;
-    let id = store.resolve(id)?;
-    let head = head_of(&loaded, &store, &id)?;
-    known_axis(&loaded, &head.axis)?;
-    store.activate(&head.axis, &id)?;
-    Ok((head.axis, id))
+    let verb = match choice {
+        Choice::Activate(_) => "cal activate",
+        Choice::Rollback(_) => "cal rollback",
+    };
+    let _lease = Lease::take(&store, verb)?;
+    let groups = groups(&loaded.config);
+    let changes = changes_of(chosen_of(&groups, &store, choice)?, &store, choice)?;
+    for id in changes.iter().filter_map(|it| it.id.as_ref()) {
+        head_of(&loaded, &store, id)?;
+    }
+    write(&store, &changes)?;
+    Ok(changes)
 }
 
-fn known_axis(loaded: &Loaded, axis: &str) -> Result<(), Failure> {
-    let (linear, rotary) = (loaded.config.axis.keys(), loaded.config.rotary.keys());
-    let known: Vec<&str> = linear.chain(rotary).map(String::as_str).collect();
-    let mut kinds = KINDS.iter();
-    let is_pointer = kinds.any(|it| (it.pointers)(&loaded.config).iter().any(|it| it == axis));
-    if known.contains(&axis) || is_pointer {
-        return Ok(());
-    }
-    Err(Failure::Machine(machine::Failure::NoSuchAxis {
-        axis: axis.to_owned(),
-        known: known.join(", "),
-    }))
+/// The axis and the whole name.
+fn put_into_use(path: &Path, id: &str) -> Result<(String, String), Failure> {
+    let changes = choose(path, &Choice::Activate(id.to_owned()))?;
+    let used = changes.into_iter().next();
+    let used = used.and_then(|it| Some((it.pointer, it.id?)));
+    Ok(used.expect("what is activated is in use"))
 }
 
-fn rollback(path: &Path, axis: &str, output: Output) -> Ended {
-    let loaded = config::load(path)?;
-    let store = loaded.config.machine.store();
-    let _lease = Lease::take(&store, "cal rollback")?;
-    let mut kinds = KINDS.iter();
-    if let Some(all) = kinds.find_map(|it| (it.made_together)(&loaded.config, axis)) {
-        return rollback_all(&store, axis, &all, output);
-    }
-    known_axis(&loaded, axis)?;
-    let id = store.rollback(axis)?;
-    let text = format!("axis {axis}: back to {}", short(&id));
-    output.result(&text, &json!({"axis": axis, "active": id}))
+/// What is used under one name of the store.
+pub(crate) struct Used<'u> {
+    pub(crate) pointer: &'u str,
+    pub(crate) id: Option<&'u str>,
+    /// Whether it was gone back to.
+    pub(crate) is_earlier: bool,
 }
 
-/// Every axis of those called `name` goes back, or none.
-fn rollback_all(store: &Store, name: &str, axes: &[String], output: Output) -> Ended {
-    for axis in axes {
-        store.earlier(axis)?;
+impl Used<'_> {
+    fn text(&self) -> String {
+        let pointer = self.pointer;
+        match (self.id.map(short), self.is_earlier) {
+            (Some(id), true) => format!("axis {pointer}: back to {id}"),
+            (Some(id), false) => format!("axis {pointer}: {id} is in use"),
+            (None, _) => format!("axis {pointer}: nothing is in use"),
+        }
     }
-    let mut lines = Vec::new();
-    let mut active = serde_json::Map::new();
-    for axis in axes {
-        let id = store.rollback(axis)?;
-        lines.push(format!("axis {axis}: back to {}", short(&id)));
-        active.insert(axis.clone(), json!(id));
-    }
-    output.result(&lines.join("\n"), &json!({"axis": name, "active": active}))
+}
+
+/// What came of `choice`.
+pub(crate) fn told(choice: &Choice, all: &[Used<'_>], output: Output) -> Ended {
+    let lines: Vec<_> = all.iter().map(Used::text).collect();
+    let value = match (all, choice) {
+        ([only], _) => json!({"axis": only.pointer, "active": only.id}),
+        (all, choice) => {
+            let name = match choice {
+                Choice::Rollback(name) => Some(name.as_str()),
+                Choice::Activate(_) => all.first().map(|it| it.pointer),
+            };
+            let active = all.iter().map(|it| (it.pointer.to_owned(), json!(it.id)));
+            json!({"axis": name, "active": active.collect::<serde_json::Map<_, _>>()})
+        }
+    };
+    output.result(&lines.join("\n"), &value)
 }
 
 #[cfg(test)]

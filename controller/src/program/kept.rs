@@ -14,10 +14,12 @@ use units::Time;
 
 use crate::Failure;
 use crate::program::answering::{Answering, Asked};
+use crate::program::cal::{Used, told};
 use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
+use crate::runs::Choice;
 use crate::program::{AskArgs, AxisArgs, CalibrateArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
 use machine::{Observer as _, Stage, StopRequest};
 
@@ -104,6 +106,22 @@ impl Service {
         );
         let (text, value) = words_of(&run);
         output.bad_result(&text, value, Failure::Kept { said, exit_code })
+    }
+
+    /// Uses another calibration from now on.
+    pub(crate) fn choose(&self, choice: &Choice, output: Output) -> Ended {
+        let (path, body) = match choice {
+            Choice::Activate(id) => (format!("/v1/calibrations/{}/activate", plain(id)), json!({})),
+            Choice::Rollback(axis) => ("/v1/calibrations/rollback".into(), json!({"axis": axis})),
+        };
+        let chosen = ask(&self.at, "POST", &path, &body.to_string())?;
+        let changes = chosen["changes"].as_array().into_iter().flatten();
+        let changes = changes.map(|it| Used {
+            pointer: it["of"].as_str().unwrap_or_default(),
+            id: it["id"].as_str(),
+            is_earlier: it["is_earlier"] == true,
+        });
+        told(choice, &changes.collect::<Vec<_>>(), output)
     }
 
     /// What comes before a run that measures: options that are not offered are refused, and the axis has its zero.

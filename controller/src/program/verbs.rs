@@ -22,10 +22,6 @@ pub(crate) struct Verbs {
     pub(crate) has_the_axes: fn(&MachineConfig) -> bool,
     /// What an operator should know of a configuration that is sound.
     pub(crate) notes: fn(&MachineConfig) -> Vec<String>,
-    /// What its calibrations are called that are no axis's.
-    pub(crate) pointers: fn(&MachineConfig) -> Vec<String>,
-    /// The axes whose calibrations were made together under this name, and go back together.
-    pub(crate) made_together: fn(&MachineConfig, &str) -> Option<Vec<String>>,
     /// Its demonstrations.
     pub(crate) demos: &'static [Demo],
     /// Words that it has no use for.

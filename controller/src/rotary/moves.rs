@@ -35,30 +35,6 @@ impl RotaryTable<'_> {
         Ok(Some(id))
     }
 
-    /// Uses calibration `id` from now on, now and after the next start; nothing moves, and the one used before
-    /// stays in the history.
-    ///
-    /// # Errors
-    /// As [`RotaryTable::load_active`]; the calibration used before is used still.
-    pub fn activate(&mut self, store: &Store, id: &str) -> Result<(), Failure> {
-        let usable = self.subject().usable(store, id)?;
-        store.activate(self.axis, id)?;
-        self.memory.calibration = Some(usable);
-        Ok(())
-    }
-
-    /// Uses the calibration that was used before; returns its name.
-    ///
-    /// # Errors
-    /// When there is none; as [`RotaryTable::activate`].
-    pub fn rollback(&mut self, store: &Store) -> Result<String, Failure> {
-        let earlier = store.earlier(self.axis)?;
-        let usable = self.subject().usable(store, &earlier)?;
-        store.rollback(self.axis)?;
-        self.memory.calibration = Some(usable);
-        Ok(earlier)
-    }
-
     /// The calibration in use.
     pub fn compensation(&self) -> Option<&PeriodicCompensation> {
         let calibration = self.memory.calibration.as_ref()?;

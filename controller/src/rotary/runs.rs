@@ -17,7 +17,7 @@ use crate::rotary::asked::Asking;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::table::RotaryTable;
 use crate::run::missing;
-use crate::runs::{Found, Group, GroupRuns, Planned, Task, Travel, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -27,7 +27,8 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
-    choose: Some(choose),
+    with_companions: |_, chosen| Ok(chosen),
+    usable,
     paths: None,
     moves: None,
 };
@@ -219,15 +220,14 @@ fn load(
     Ok(vec![(axis.to_owned(), id)])
 }
 
-fn choose(
-    machine: &mut Machine,
-    store: &Store,
-    axis: &str,
-    id: Option<&str>,
-) -> Result<String, Failure> {
-    let mut own = machine.rotary(axis)?;
-    match id {
-        Some(id) => own.activate(store, id).map(|()| id.to_owned()),
-        None => own.rollback(store),
+fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
+    for change in changes {
+        if let Some(id) = &change.id {
+            machine
+                .rotary(&change.pointer)?
+                .subject()
+                .usable(store, id)?;
+        }
     }
+    Ok(())
 }

@@ -3,6 +3,7 @@
 use machine::Stage;
 use machine::records::Store;
 
+use super::choice::{Change, Choice, changes_of, chosen_of, write};
 use super::path::PathJudge;
 use super::person::Person;
 use super::task::{Found, Planned, Task, Work};
@@ -35,6 +36,8 @@ pub struct Group {
     pub moved: Moved,
     /// Where it is as one, part by part; nothing of axes that are only moved by themselves.
     pub parts: Vec<Part>,
+    /// What the store calls what it uses: its axes, or what its kind keeps of them together.
+    pub pointers: Vec<String>,
     /// What its journals are called.
     pub(crate) journals: String,
     /// What its kind does for it.
@@ -58,16 +61,15 @@ pub(crate) struct GroupRuns {
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
     pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
-    /// Uses this calibration of an axis from now on, or the one before; its name. Where each axis has its own.
-    pub(crate) choose: Option<Chooses>,
+    /// What else is used otherwise when these are: what counts from them.
+    pub(crate) with_companions: fn(&Store, Vec<Change>) -> Result<Vec<Change>, Failure>,
+    /// Whether this machine can use these, together with the others in use.
+    pub(crate) usable: fn(&mut Machine, &Store, &[Change]) -> Result<(), Failure>,
     /// Who judges paths that it follows, where it follows some.
     pub(crate) paths: Option<MakesPathJudge>,
     /// How it is moved as one, where it is.
     pub(crate) moves: Option<&'static GroupMoves>,
 }
-
-/// Uses another calibration of an axis.
-pub(crate) type Chooses = fn(&mut Machine, &Store, &str, Option<&str>) -> Result<String, Failure>;
 
 /// Makes who judges paths.
 pub(crate) type MakesPathJudge = fn(&mut Machine) -> Result<PathJudge, Failure>;
@@ -83,6 +85,7 @@ impl Group {
             axes: vec![axis.to_owned()],
             moved: Moved::Alone,
             parts: Vec::new(),
+            pointers: vec![axis.to_owned()],
             journals: axis.to_owned(),
             runs,
         }
@@ -159,22 +162,39 @@ impl Group {
         (self.runs.load)(machine, store, &self.name)
     }
 
-    /// Uses the calibration `id` of its only axis from now on, or without one the one that was used before; says which
-    /// that is. Nothing moves.
+    /// Whether `name` is what the store calls something that it uses, or it itself.
+    pub(crate) fn is_about(&self, name: &str) -> bool {
+        self.name == name || self.pointers.iter().any(|it| it == name)
+    }
+
+    /// The one of `groups` whose calibrations `choice` is about.
     ///
     /// # Errors
-    /// When its axes are calibrated together, or it cannot be used; the one before is used still.
+    /// When there is none, or no such calibration.
+    pub fn chosen<'g>(
+        groups: &'g [Self],
+        store: &Store,
+        choice: &Choice,
+    ) -> Result<&'g Self, Failure> {
+        chosen_of(groups, store, choice)
+    }
+
+    /// Uses what `choice` says from now on, now and after the next start; says what that changed. Nothing moves: the
+    /// next move is corrected by it, from where the axes stand.
+    ///
+    /// # Errors
+    /// When it cannot be used on this machine, or not with the others in use; what was used before is used still.
     pub fn choose(
         &self,
         machine: &mut Machine,
         store: &Store,
-        id: Option<&str>,
-    ) -> Result<String, Failure> {
-        let choose = self.runs.choose.ok_or_else(|| Failure::Usage {
-            what: format!("the axes of {} are calibrated together", self.name),
-            help: "use `truestage cal` while the service is not running".into(),
-        })?;
-        choose(machine, store, &self.name, id)
+        choice: &Choice,
+    ) -> Result<Vec<Change>, Failure> {
+        let changes = changes_of(self, store, choice)?;
+        (self.runs.usable)(machine, store, &changes)?;
+        write(store, &changes)?;
+        self.load(machine, store)?;
+        Ok(changes)
     }
 
     /// Who judges paths that it follows; `None` where it follows none.

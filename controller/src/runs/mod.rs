@@ -4,6 +4,7 @@
 //! A kind says what of a machine it runs as one ([`Group`]), and does it, by the same procedures as the verbs of the
 //! command line: `runs.rs` in its folder. [`groups`](crate::groups) lists what a machine has.
 
+mod choice;
 mod group;
 mod path;
 mod person;
@@ -11,6 +12,7 @@ mod task;
 mod teller;
 mod together;
 
+pub use choice::{Change, Choice};
 pub use group::{Group, Moved};
 pub use path::{JudgedPath, PathJudge};
 pub use person::{Person, Question};
@@ -18,6 +20,8 @@ pub use task::{Found, Planned, Task, Travel};
 pub use teller::{Teller, Told};
 pub use together::{GroupMove, GroupMoved, Judge, Part, PartMoved, Place};
 
+#[cfg(feature = "program")]
+pub(crate) use choice::{changes_of, chosen_of, write};
 pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]

@@ -21,6 +21,7 @@
 mod asked;
 pub(crate) mod calibrate;
 pub(crate) mod check;
+mod chosen;
 mod config;
 mod correction;
 mod dependence;

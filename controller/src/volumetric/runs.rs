@@ -13,6 +13,7 @@ use crate::runs::{
     Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
 };
 use crate::volumetric::asked::Asking;
+use crate::volumetric::chosen;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::motion::{MOVES, require_measured};
@@ -35,7 +36,8 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     planned,
     perform,
     load,
-    choose: None,
+    with_companions: chosen::with_companions,
+    usable: chosen::usable,
     paths: Some(paths),
     moves: Some(&MOVES),
 };
@@ -47,6 +49,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
         axes: volume.axes.to_vec(),
         moved: Moved::CorrectedTogether,
         parts: volume.axes.iter().map(|it| Part::of_length(it)).collect(),
+        pointers: chosen::pointers(),
         journals: GEOMETRY.to_owned(),
         runs: &RUNS,
     });

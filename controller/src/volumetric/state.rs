@@ -9,6 +9,7 @@ use compensator::volumetric::online::{BeamReference, Memories};
 
 use crate::config::ConfigHash;
 use crate::failure::Failure;
+use crate::runs::Change;
 use crate::store::{Content, IdentityRecord, RecordHead, Store, StoreError, short};
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::handle::WorkVolume;
@@ -42,17 +43,31 @@ pub struct VolumetricRecords {
     pub second_memory: Option<String>,
 }
 
+/// What is used under `pointer` after `changes`.
+pub(super) fn used(
+    store: &Store,
+    changes: &[Change],
+    pointer: &str,
+) -> Result<Option<String>, StoreError> {
+    match changes.iter().find(|it| it.pointer == pointer) {
+        Some(change) => Ok(change.id.clone()),
+        None => Ok(store.active(pointer)?.current),
+    }
+}
+
 /// Reads records of one machine, and refuses those of others.
 struct Reader<'a> {
     store: &'a Store,
     here: RecordHead,
     hash: &'a ConfigHash,
+    /// What is read in place of what is in use.
+    changes: &'a [Change],
 }
 
 impl Reader<'_> {
     /// The record that is in use under `pointer`, with its name.
     fn active<C: Content>(&self, pointer: &str) -> Result<Option<(String, C)>, StoreError> {
-        let Some(id) = self.store.active(pointer)?.current else {
+        let Some(id) = used(self.store, self.changes, pointer)? else {
             return Ok(None);
         };
         let record = self.store.load::<C>(&id)?;
@@ -80,10 +95,30 @@ impl WorkVolume<'_> {
         self.state_with(store, &[MemoryName::First, MemoryName::Second])
     }
 
+    /// What it will be after these `changes`.
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub(super) fn state_after(
+        &self,
+        store: &Store,
+        changes: &[Change],
+    ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
+        self.state_of((store, changes), &[MemoryName::First, MemoryName::Second])
+    }
+
     /// Likewise, with no other memories than `wanted`, the first before the second.
     pub(super) fn state_with(
         &self,
         store: &Store,
+        wanted: &[MemoryName],
+    ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
+        self.state_of((store, &[]), wanted)
+    }
+
+    fn state_of(
+        &self,
+        (store, changes): (&Store, &[Change]),
         wanted: &[MemoryName],
     ) -> Result<Option<(VolumetricState, VolumetricRecords)>, Failure> {
         let config = self.config;
@@ -92,6 +127,7 @@ impl WorkVolume<'_> {
             store,
             here,
             hash: self.core.config_hash,
+            changes,
         };
         let Some((id, geometry)) = reader.active::<GeometryContent>(GEOMETRY)? else {
             return Ok(None);
@@ -112,16 +148,7 @@ impl WorkVolume<'_> {
             ..VolumetricRecords::default()
         };
         if let Some((id, references)) = reader.active::<BeamReferencesContent>(REFERENCES)? {
-            if references.geometry != records.geometry {
-                let (references, measured_with) = (short(&id), short(&references.geometry));
-                let geometry = short(&records.geometry);
-                return Err(VolumetricFailure::OtherGeometry {
-                    references,
-                    measured_with,
-                    geometry,
-                }
-                .into());
-            }
+            check_references((&id, &references), &records.geometry)?;
             state.beams = beams(&id, &references, config)?;
             state.rolls = references.rolls(&id, config)?;
             records.references = Some(id);
@@ -221,8 +248,23 @@ fn memories(
     Ok(memories)
 }
 
+/// References count from the errors that the machine had when they were taken.
+pub(super) fn check_references(
+    (id, references): (&str, &BeamReferencesContent),
+    geometry: &str,
+) -> Result<(), VolumetricFailure> {
+    if references.geometry == geometry {
+        return Ok(());
+    }
+    Err(VolumetricFailure::OtherGeometry {
+        references: short(id),
+        measured_with: short(&references.geometry),
+        geometry: short(geometry),
+    })
+}
+
 /// What does not count from what is in use keeps something else than it should.
-fn check_memory(
+pub(super) fn check_memory(
     id: &str,
     content: &StateMemoryContent,
     records: &VolumetricRecords,

@@ -1,12 +1,13 @@
 //! Calibrations: which there are, and which one is used.
 
 use machine::records::StoreError;
+use truestage::runs::Choice;
 
-use super::{Desk, named};
-use crate::order::{Choice, Order};
-use crate::problem::Problem;
+use super::Desk;
+use crate::order::{Answer, Order};
+use crate::problem::{Code, Problem};
 use crate::request::Caller;
-use crate::view::CalibrationView;
+use crate::view::{CalibrationView, ChangeView, ChosenView};
 
 /// Calibrations.
 impl Desk {
@@ -37,24 +38,37 @@ impl Desk {
         Ok(views)
     }
 
-    /// Uses the calibration whose name begins with `id` from now on; returns its axis. Nothing moves.
+    /// Uses the calibration whose name begins with `id` from now on. Nothing moves.
     ///
     /// # Errors
-    /// When it is not there, damaged, of another machine, or its axis is in use.
-    pub fn activate(&self, caller: &Caller, id: &str) -> Result<String, Problem> {
+    /// When it is not there, damaged, of another machine, does not go with others in use, or an axis is in use.
+    pub fn activate(&self, caller: &Caller, id: &str) -> Result<ChosenView, Problem> {
         self.choose(caller, Choice::Activate(id.to_owned()))
     }
 
-    /// Uses the calibration that `axis` used before; returns the axis. Nothing moves.
+    /// Uses the calibration that `axis` used before: of a platform (`platform`) those of all its screws, of three axes
+    /// (`volume`) their errors and what counts from them. Nothing moves.
     ///
     /// # Errors
-    /// When there is none, or the axis is in use.
-    pub fn rollback(&self, caller: &Caller, axis: &str) -> Result<String, Problem> {
+    /// When there is none, it cannot be used, or an axis is in use.
+    pub fn rollback(&self, caller: &Caller, axis: &str) -> Result<ChosenView, Problem> {
         self.choose(caller, Choice::Rollback(axis.to_owned()))
     }
 
-    fn choose(&self, caller: &Caller, choice: Choice) -> Result<String, Problem> {
+    fn choose(&self, caller: &Caller, choice: Choice) -> Result<ChosenView, Problem> {
         let answer = self.give(caller, Order::Calibration(choice))?.wait()?;
-        named(answer)
+        self.chosen(answer)
+    }
+
+    /// What an order for another calibration came to.
+    pub(crate) fn chosen(&self, answer: Answer) -> Result<ChosenView, Problem> {
+        let Answer::Chosen(changes, axes) = answer else {
+            return Err(Problem::new(Code::Ending, "nothing was chosen", ""));
+        };
+        let axes = axes.iter().map(|it| self.axis(it));
+        Ok(ChosenView {
+            changes: changes.into_iter().map(ChangeView::from).collect(),
+            axes: axes.collect::<Result<_, _>>()?,
+        })
     }
 }

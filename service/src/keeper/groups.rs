@@ -88,12 +88,6 @@ impl Keeper {
         groups.map(|it| Arc::clone(&it.group)).collect()
     }
 
-    /// The group that the axis `name` is by itself.
-    pub(crate) fn own_group(&self, name: &str) -> Result<Arc<Group>, Problem> {
-        let at = self.group_of(Some(name))?;
-        Ok(Arc::clone(&self.groups[at].group))
-    }
-
     /// The number of the group that a run is for.
     pub(super) fn group_of(&self, asked: Option<&str>) -> Result<usize, Problem> {
         match (asked, self.groups.as_slice()) {

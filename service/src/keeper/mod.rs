@@ -22,10 +22,10 @@ use std::sync::mpsc::Receiver;
 use machine::{Attendant, Failure, Machine, Observer, Stage};
 use serde_json::json;
 use triple_buffer::Input;
-use truestage::runs::Teller;
+use truestage::runs::{Choice, Teller};
 
 use crate::figures::Book;
-use crate::order::{Answered, Choice, Letter, Reply};
+use crate::order::{Answered, Letter, Reply};
 use crate::snapshot::Snapshot;
 use crate::view::Cause;
 use events::Events;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use machine::{Driving, Machine};
-use truestage::runs::Moved;
+use truestage::runs::{Change, Choice, Group};
 
 use super::seat::Task;
 use super::stop::stopped_problem;
 use super::{Job, Keeper, Mode};
-use crate::order::{Answer, Answered, Choice, Letter, Order, Reply};
+use crate::order::{Answer, Answered, Letter, Order, Reply};
 use crate::problem::{Code, Problem};
 
 impl Keeper {
@@ -173,25 +173,30 @@ impl Keeper {
         }
     }
 
-    /// Refuses an axis whose calibration cannot be chosen by itself, or is in use.
-    pub(crate) fn require_own_calibration(&self, axis: &str) -> Result<(), Problem> {
-        let at = self.place(axis)?;
-        let seat = &self.seats[at];
-        if seat.moved == Moved::Alone {
-            return self.require_free(at);
-        }
-        let what = format!("the calibration of axis {axis} is not chosen while the service runs");
-        let help = "use `truestage cal` while the service is not running";
-        Err(Problem::new(Code::NotOffered, what, help))
+    /// Refuses axes of which somebody has one.
+    pub(crate) fn require_all_free(&self, group: &Group) -> Result<(), Problem> {
+        let axes = group.axes.iter();
+        axes.map(|it| self.require_free(self.place(it)?)).collect()
     }
 
-    /// The axis uses this calibration from now on.
-    pub(crate) fn chosen(&mut self, machine: &Machine, axis: &str, id: &str, by: &str) {
-        let data = serde_json::json!({"id": id, "by": by});
-        self.events.push("calibration", axis, data);
-        if let Ok(at) = self.place(axis) {
-            // It was that of a stop by the calibration before.
-            self.seats[at].standard_uncertainty = None;
+    /// The axes of `group` are corrected otherwise from now on.
+    pub(crate) fn chosen(
+        &mut self,
+        machine: &Machine,
+        group: &Group,
+        changes: &[Change],
+        by: &str,
+    ) {
+        for change in changes {
+            let data = serde_json::json!({"id": change.id, "by": by});
+            self.events.push("calibration", &change.pointer, data);
+        }
+        for axis in &group.axes {
+            if let Ok(at) = self.place(axis) {
+                // They were those of a stop by the calibration before.
+                self.seats[at].standard_uncertainty = None;
+                self.seats[at].rests_at = None;
+            }
         }
         self.publish(machine);
     }

@@ -17,7 +17,7 @@ use crate::client::PATIENCE;
 use crate::stage::Stage;
 
 /// Few strokes: how good the screws' models become is asked elsewhere.
-fn few_strokes(text: String) -> String {
+pub(super) fn few_strokes(text: String) -> String {
     text.edit("step_mm = 0.25", "step_mm = 0.625")
         .edit("runs = 2", "runs = 1")
 }
@@ -37,7 +37,7 @@ fn with_platform_of(change: fn(String) -> String, body: impl Fn(&Bed<'_>)) {
     each(new, zeroed(body));
 }
 
-fn pose(x_mm: f64, y_mm: f64, arcsec: f64) -> MoveRequest {
+pub(super) fn pose(x_mm: f64, y_mm: f64, arcsec: f64) -> MoveRequest {
     let theta = Coordinate::Angle(Radians::from_arcsec(arcsec));
     MoveRequest {
         targets: [
@@ -301,7 +301,7 @@ fn with_known_volume(body: impl Fn(&Bed<'_>)) {
 }
 
 /// By how much the tool is off where the axes are to be, in µm.
-fn off_um(bed: &Bed<'_>, mm: [f64; 3]) -> [f64; 3] {
+pub(super) fn off_um(bed: &Bed<'_>, mm: [f64; 3]) -> [f64; 3] {
     bed.stage.simulation(move |simulation| {
         let truth = simulation.truth();
         let truth = truth.volumetric().expect("three axes");

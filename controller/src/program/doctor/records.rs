@@ -10,8 +10,8 @@ use units::Several;
 
 use super::checked::Checked;
 use crate::config::MachineConfig;
+use crate::groups;
 use crate::program::intended::ago;
-use crate::program::kind::KINDS;
 
 /// Less than this is left: a run may not find room for its journal.
 const ROOM_LEAST: u64 = 1 << 30;
@@ -45,10 +45,14 @@ pub(super) fn folder(root: &Path) -> Vec<Checked> {
 
 /// What is in use.
 pub(super) fn calibrations(config: &MachineConfig, store: &Store) -> Vec<Checked> {
-    let axes = config.axis.keys().chain(config.rotary.keys()).cloned();
-    let pointers = KINDS.iter().flat_map(|it| (it.pointers)(config));
-    let each = axes.chain(pointers).map(|it| calibration(store, &it));
-    each.collect()
+    let axes = config.axis.keys().chain(config.rotary.keys());
+    let mut names: Vec<String> = axes.cloned().collect();
+    for pointer in groups(config).into_iter().flat_map(|it| it.pointers) {
+        if !names.contains(&pointer) {
+            names.push(pointer);
+        }
+    }
+    names.iter().map(|it| calibration(store, it)).collect()
 }
 
 /// Who has the machine, if anybody has.

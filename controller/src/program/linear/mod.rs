@@ -38,8 +38,6 @@ fn notes(config: &MachineConfig) -> Vec<String> {
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |_| false,
     notes,
-    pointers: |_| Vec::new(),
-    made_together: |_, _| None,
     demos: demo::DEMOS,
     refuse: intended::refuse,
     intended: intended::intended,

@@ -23,15 +23,12 @@ use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
 use crate::Failure;
-use crate::config::MachineConfig;
 use crate::platform::{PlatformLog, ScrewContent};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |config| config.platform.is_some(),
     notes: plan::notes,
-    pointers: |_| Vec::new(),
-    made_together: screws_of,
     demos: demo::DEMOS,
     refuse: intended::refuse,
     intended: intended::intended,
@@ -53,13 +50,4 @@ fn html(path: &Path) -> Result<String, Failure> {
     let journal = read_journal::<PlatformLog>(path)?;
     let page = PlatformPage::of(&journal, made_from::<ScrewContent>(path)?);
     Ok(report::render(&page))
-}
-
-/// What `--axis` calls all screws of a platform.
-const PLATFORM: &str = "platform";
-
-/// A platform moves by models that were made together.
-fn screws_of(config: &MachineConfig, name: &str) -> Option<Vec<String>> {
-    let platform = config.platform.as_ref().filter(|_| name == PLATFORM)?;
-    Some(platform.actuator.iter().map(|it| it.axis.clone()).collect())
 }

@@ -37,8 +37,6 @@ const STILL: f64 = 4.0;
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |_| false,
     notes,
-    pointers: |_| Vec::new(),
-    made_together: |_, _| None,
     demos: demo::DEMOS,
     refuse: intended::refuse,
     intended: intended::intended,

@@ -26,17 +26,13 @@ use super::show::Shown;
 use super::targets::{AskedMotion, axis_motion};
 use super::verbs::Verbs;
 use crate::Failure;
-use crate::config::MachineConfig;
 use crate::program::MoveArgs;
 use crate::volumetric::{BeamReferencesContent, GeometryContent, StateMemoryContent, VolumeLog};
-use crate::volumetric::{GEOMETRY, MemoryName, REFERENCES, memory_pointer};
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
     has_the_axes: |config| config.volumetric.is_some(),
     notes: |_| Vec::new(),
-    pointers,
-    made_together: |_, _| None,
     demos: demo::DEMOS,
     refuse: intended::refuse,
     intended: intended::intended,
@@ -77,14 +73,4 @@ fn motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
         zeroed: vec!["volume".to_owned()],
         ..axis_motion(args)?
     })
-}
-
-/// Of the whole volume.
-fn pointers(config: &MachineConfig) -> Vec<String> {
-    if config.volumetric.is_none() {
-        return Vec::new();
-    }
-    let memories = [MemoryName::First, MemoryName::Second].map(memory_pointer);
-    let pointers = [GEOMETRY, REFERENCES].into_iter().chain(memories);
-    pointers.map(str::to_owned).collect()
 }

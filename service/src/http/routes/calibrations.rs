@@ -3,17 +3,18 @@
 use axum::Json;
 use axum::extract::State as Of;
 use serde::Deserialize;
+use truestage::runs::Choice;
 use utoipa::ToSchema;
 
 use super::super::guard::{Asks, Body, By, Named, plain};
 use super::super::state::State;
 use super::journals::from_disk;
 use super::obey;
-use crate::desk::{Desk, named};
-use crate::order::{Choice, Order};
+use crate::desk::Desk;
+use crate::order::Order;
 use crate::problem::{Problem, ProblemBody};
 use crate::request::Caller;
-use crate::view::{AxisView, CalibrationView};
+use crate::view::{CalibrationView, ChosenView};
 
 /// The calibrations that are stored, the oldest first.
 #[utoipa::path(
@@ -34,7 +35,7 @@ pub(super) async fn calibrations(
     post, path = "/calibrations/{id}/activate", tag = "calibrations",
     params(Asks, ("id" = String, Path, description = "Its name, or the beginning of it")),
     responses(
-        (status = 200, description = "Its axis, which uses it", body = AxisView),
+        (status = 200, description = "What is used now, and by which axes", body = ChosenView),
         (status = "4XX", description = "Refused; the one before is used still", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
     )
@@ -43,23 +44,24 @@ pub(super) async fn activate(
     Of(state): Of<State>,
     By(caller): By,
     Named(id): Named,
-) -> Result<Json<AxisView>, Problem> {
+) -> Result<Json<ChosenView>, Problem> {
     choose(&state.desk, &caller, Choice::Activate(id)).await
 }
 
-/// Which axis goes back.
+/// What goes back.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RollbackRequest {
-    /// Its name.
+    /// An axis, or `platform` or `volume`; of three axes also `volume-references`, `volume-first-memory` or
+    /// `volume-second-memory`.
     axis: String,
 }
 
-/// Uses the calibration that an axis used before. Nothing moves.
+/// Uses what was used before. Nothing moves.
 #[utoipa::path(
     post, path = "/calibrations/rollback", tag = "calibrations", request_body = RollbackRequest, params(Asks),
     responses(
-        (status = 200, description = "The axis, which uses the earlier one", body = AxisView),
+        (status = 200, description = "What is used now, and by which axes", body = ChosenView),
         (status = "4XX", description = "Refused; the one before is used still", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
     )
@@ -68,11 +70,11 @@ pub(super) async fn rollback(
     Of(state): Of<State>,
     By(caller): By,
     Body(request): Body<RollbackRequest>,
-) -> Result<Json<AxisView>, Problem> {
+) -> Result<Json<ChosenView>, Problem> {
     choose(&state.desk, &caller, Choice::Rollback(plain(&request.axis))).await
 }
 
-async fn choose(desk: &Desk, caller: &Caller, choice: Choice) -> Result<Json<AxisView>, Problem> {
-    let axis = named(obey(desk, caller, Order::Calibration(choice)).await?)?;
-    Ok(Json(desk.axis(&axis)?))
+async fn choose(desk: &Desk, caller: &Caller, choice: Choice) -> Result<Json<ChosenView>, Problem> {
+    let answer = obey(desk, caller, Order::Calibration(choice)).await?;
+    desk.chosen(answer).map(Json)
 }

@@ -1,0 +1,140 @@
+//! Which calibrations are used from now on: what is chosen, and what in the store that changes.
+
+use machine::records::{Store, StoreError};
+
+use super::group::Group;
+use crate::failure::Failure;
+
+/// What somebody wants to be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// This calibration, by the beginning of its name.
+    Activate(String),
+    /// The one that was used before: of an axis, or of all that is called so and was made together.
+    Rollback(String),
+}
+
+impl Choice {
+    /// What the store calls what it is about.
+    fn of(&self, store: &Store) -> Result<String, StoreError> {
+        match self {
+            Self::Activate(beginning) => {
+                let id = store.resolve(beginning)?;
+                Ok(store.glance(&id)?.head.axis)
+            }
+            Self::Rollback(name) => Ok(name.clone()),
+        }
+    }
+}
+
+/// What is used under one name of the store from now on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// What the store calls it: an axis, or what a kind keeps besides.
+    pub pointer: String,
+    /// The calibration; `None`: none.
+    pub id: Option<String>,
+    /// Whether it is the one that was used before the one in use.
+    pub is_earlier: bool,
+}
+
+impl Change {
+    /// Uses `id`, which is gone back to where it was used before.
+    ///
+    /// # Errors
+    /// When the pointer cannot be read.
+    pub(crate) fn to(store: &Store, pointer: &str, id: String) -> Result<Self, StoreError> {
+        let used = store.active(pointer)?;
+        Ok(Self {
+            pointer: pointer.to_owned(),
+            is_earlier: used.history.last() == Some(&id),
+            id: Some(id),
+        })
+    }
+
+    /// Uses nothing any more.
+    pub(crate) fn to_nothing(pointer: &str) -> Self {
+        Self {
+            pointer: pointer.to_owned(),
+            id: None,
+            is_earlier: false,
+        }
+    }
+
+    fn back(store: &Store, pointer: &str) -> Result<Self, StoreError> {
+        Ok(Self {
+            pointer: pointer.to_owned(),
+            id: Some(store.earlier(pointer)?),
+            is_earlier: true,
+        })
+    }
+}
+
+/// The group of `groups` that `choice` is about.
+///
+/// # Errors
+/// When there is none, or no such calibration.
+pub(crate) fn chosen_of<'g>(
+    groups: &'g [Group],
+    store: &Store,
+    choice: &Choice,
+) -> Result<&'g Group, Failure> {
+    let of = choice.of(store)?;
+    let found = groups.iter().find(|it| it.is_about(&of));
+    found.ok_or_else(|| {
+        let known = groups.iter().flat_map(|it| it.pointers.iter().cloned());
+        let known: Vec<_> = known.collect();
+        Failure::Machine(machine::Failure::NoSuchAxis {
+            axis: of,
+            known: known.join(", "),
+        })
+    })
+}
+
+/// What `choice` changes of what `group` uses. Nothing is written.
+///
+/// # Errors
+/// When there is no such calibration, none before, or it does not go with the others in use.
+pub(crate) fn changes_of(
+    group: &Group,
+    store: &Store,
+    choice: &Choice,
+) -> Result<Vec<Change>, Failure> {
+    let chosen = match choice {
+        Choice::Activate(beginning) => {
+            let id = store.resolve(beginning)?;
+            let pointer = store.glance(&id)?.head.axis;
+            vec![Change {
+                is_earlier: false,
+                ..Change::to(store, &pointer, id)?
+            }]
+        }
+        Choice::Rollback(name) if group.pointers.contains(name) => vec![Change::back(store, name)?],
+        // All of them, or none.
+        Choice::Rollback(_) => {
+            let all = group.pointers.iter().map(|it| Change::back(store, it));
+            all.collect::<Result<_, _>>()?
+        }
+    };
+    (group.runs.with_companions)(store, chosen)
+}
+
+/// Writes what is used from now on; all of it was read and can be used.
+///
+/// # Errors
+/// When a pointer cannot be written.
+pub(crate) fn write(store: &Store, changes: &[Change]) -> Result<(), StoreError> {
+    for Change {
+        pointer,
+        id,
+        is_earlier,
+    } in changes
+    {
+        match (id, is_earlier) {
+            (Some(_), true) => drop(store.rollback(pointer)?),
+            (Some(id), false) => store.activate(pointer, id)?,
+            (None, _) => drop(store.put_out_of_use(pointer)?),
+        }
+    }
+    Ok(())
+}
