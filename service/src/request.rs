@@ -189,7 +189,7 @@ impl RunKind {
 }
 
 /// A run that is asked for. It is planned, and begins when it is started.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
     /// What is run.
@@ -204,6 +204,11 @@ pub struct RunRequest {
     /// Verify: without the calibration, the stage as found. Path: by the encoders alone.
     #[serde(default)]
     pub uncompensated: bool,
+    /// Calibrate three axes: they go to and fro for so many minutes, and the lines are read again that show what
+    /// warmth changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0, exclusive_maximum = 100000)]
+    pub warm_up_min: Option<f64>,
     /// Path: its rows as a CSV file has them, a heading and a row for each moment: `time_s,x_mm,y_mm,z_mm`. A line
     /// `# join: linear 50um` above the heading joins them by straight lines whose corners are passed within that
     /// length; without it runs a cubic spline, at rest at both ends. At most 600 s.
@@ -223,6 +228,7 @@ impl RunRequest {
             axis: axis.map(str::to_owned),
             accept_drift: false,
             uncompensated: false,
+            warm_up_min: None,
             path: None,
             start: true,
         }

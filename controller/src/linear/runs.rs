@@ -15,7 +15,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
     offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
     resumed: |_, _, stage| matches!(stage, Stage::Calibrate | Stage::Verify),
-    refuse: |_| Ok(()),
+    refuse: Task::without_warm_up,
     planned,
     perform,
     load,
@@ -30,8 +30,9 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
     axes.map(|it| Group::of_one(it, &RUNS)).collect()
 }
 
-fn planned(machine: &mut Machine, axis: &str, stage: Stage) -> Result<Planned, Failure> {
+fn planned(machine: &mut Machine, axis: &str, task: &Task) -> Result<Planned, Failure> {
     let stage_of = machine.linear(axis)?;
+    let stage = task.stage;
     if stage == Stage::Zero {
         let zero = stage_of.config().zero.as_ref();
         return zero

@@ -48,6 +48,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
 }
 
 fn refuse(task: &Task) -> Result<(), Failure> {
+    task.without_warm_up()?;
     if !task.accept_drift {
         return Ok(());
     }
@@ -57,11 +58,11 @@ fn refuse(task: &Task) -> Result<(), Failure> {
     })
 }
 
-fn planned(machine: &mut Machine, _: &str, stage: Stage) -> Result<Planned, Failure> {
+fn planned(machine: &mut Machine, _: &str, task: &Task) -> Result<Planned, Failure> {
     let platform = machine.platform()?;
     let config = platform.config;
     let missing = |section| PlatformFailure::NotConfigured { section };
-    let points = match stage {
+    let points = match task.stage {
         Stage::Calibrate => {
             let own = config.calibrate.as_ref().ok_or(missing("calibrate"))?;
             let strokes = config.actuator.iter().map(|it| own.strokes_of(it));

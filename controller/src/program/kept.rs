@@ -70,12 +70,15 @@ impl Service {
         asked: Vec<&'static Asked>,
         output: Output,
     ) -> Ended {
-        refuse(args.warm_up_min.is_some(), "--warm-up-min")?;
         refuse(args.no_activate, "--no-activate")?;
         refuse(args.verify, "--verify")?;
         refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
-        let request = json!({"axis": args.axis.axis, "accept_drift": args.accept_drift});
+        let request = json!({
+            "axis": args.axis.axis,
+            "accept_drift": args.accept_drift,
+            "warm_up_min": args.warm_up_min,
+        });
         let resume = args.resume.as_deref();
         let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
         let waiting = waiting.who_asks(asked);

@@ -23,7 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
     offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
     resumed,
-    refuse: |_| Ok(()),
+    refuse: Task::without_warm_up,
     planned,
     perform,
     load,
@@ -48,9 +48,9 @@ fn resumed(config: &MachineConfig, axis: &str, stage: Stage) -> bool {
     }
 }
 
-fn planned(machine: &mut Machine, axis: &str, stage: Stage) -> Result<Planned, Failure> {
+fn planned(machine: &mut Machine, axis: &str, task: &Task) -> Result<Planned, Failure> {
     let table = machine.rotary(axis)?;
-    match stage {
+    match task.stage {
         Stage::Calibrate => table.planned_calibration(),
         Stage::Verify => table.planned_verification(),
         Stage::Zero | Stage::Reference | Stage::Job => {

@@ -56,7 +56,7 @@ pub(crate) struct GroupRuns {
     /// Options that it has no use for.
     pub(crate) refuse: fn(&Task) -> Result<(), Failure>,
     /// What a run of this group will do.
-    pub(crate) planned: fn(&mut Machine, &str, Stage) -> Result<Planned, Failure>,
+    pub(crate) planned: fn(&mut Machine, &str, &Task) -> Result<Planned, Failure>,
     /// Does it.
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
@@ -118,8 +118,8 @@ impl Group {
     ///
     /// # Errors
     /// When it is not configured.
-    pub fn planned(&self, machine: &mut Machine, stage: Stage) -> Result<Planned, Failure> {
-        (self.runs.planned)(machine, &self.name, stage)
+    pub fn planned(&self, machine: &mut Machine, task: &Task) -> Result<Planned, Failure> {
+        (self.runs.planned)(machine, &self.name, task)
     }
 
     /// Does what `task` says. `person` does what has to be done by hand, and `teller` says what came of it.

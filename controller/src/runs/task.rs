@@ -27,11 +27,37 @@ pub struct Task {
     pub accept_drift: bool,
     /// Verify: as found, without the calibration. A path: by the encoders alone.
     pub uncompensated: bool,
+    /// Calibrate three axes: they warm up for so many minutes, and what that changes is measured again.
+    pub warm_up_min: Option<f64>,
     /// The path that is followed, where it is one.
     pub path: Option<JudgedPath>,
 }
 
 impl Task {
+    /// The procedure of this stage, as it is done where nobody says otherwise.
+    pub const fn of(stage: Stage) -> Self {
+        Self {
+            stage,
+            resume: None,
+            accept_drift: false,
+            uncompensated: false,
+            warm_up_min: None,
+            path: None,
+        }
+    }
+
+    /// # Errors
+    /// When it is to warm up what is not measured cold and warm.
+    pub(crate) fn without_warm_up(&self) -> Result<(), Failure> {
+        match self.warm_up_min {
+            None => Ok(()),
+            Some(_) => Err(Failure::Usage {
+                what: "three axes are warmed up between the lines of their calibration, and nothing else is".into(),
+                help: "leave `warm_up_min` out".into(),
+            }),
+        }
+    }
+
     /// The same for a verb that calibrates one axis.
     pub(crate) fn calibrate_options(&self) -> CalibrateOptions {
         CalibrateOptions {
@@ -58,7 +84,7 @@ pub struct Planned {
     pub points: u64,
     /// How far the axis goes for them, where that is known.
     pub travel: Option<Travel>,
-    /// How long that takes at least.
+    /// How long that takes at least, without becoming warm.
     pub at_least: Duration,
     /// What a person will be asked, in this order.
     pub asks: Vec<String>,

@@ -56,7 +56,22 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
     group.collect()
 }
 
+/// How the axes become warm.
+fn warm_up_of(task: &Task) -> Result<WarmUp, Failure> {
+    let Some(minutes) = task.warm_up_min else {
+        return Ok(WarmUp::None);
+    };
+    WarmUp::of_minutes(minutes).ok_or_else(|| Failure::Usage {
+        what: format!("`warm_up_min` = {minutes}"),
+        help: "give the minutes for which the axes move to and fro".into(),
+    })
+}
+
 fn refuse(task: &Task) -> Result<(), Failure> {
+    match task.stage {
+        Stage::Calibrate => drop(warm_up_of(task)?),
+        Stage::Zero | Stage::Verify | Stage::Reference | Stage::Job => task.without_warm_up()?,
+    }
     if !task.accept_drift {
         return Ok(());
     }
@@ -66,18 +81,18 @@ fn refuse(task: &Task) -> Result<(), Failure> {
     })
 }
 
-fn planned(machine: &mut Machine, _: &str, stage: Stage) -> Result<Planned, Failure> {
+fn planned(machine: &mut Machine, _: &str, task: &Task) -> Result<Planned, Failure> {
     let volume = machine.volumetric()?;
-    match stage {
-        Stage::Calibrate => volume.planned_calibration(),
+    match task.stage {
+        Stage::Calibrate => volume.planned_calibration(task.warm_up_min.is_some()),
         Stage::Verify => volume.planned_verification(),
         Stage::Zero | Stage::Reference | Stage::Job => Ok(Planned::default()),
     }
 }
 
 impl WorkVolume<'_> {
-    fn planned_calibration(&self) -> Result<Planned, Failure> {
-        let (plan, lines) = volume_plan(self.config, false, Vec::new())?;
+    fn planned_calibration(&self, is_warm: bool) -> Result<Planned, Failure> {
+        let (plan, lines) = volume_plan(self.config, is_warm, Vec::new())?;
         let numbered = plan.lines.iter().enumerate();
         let set_up = numbered.filter(|(_, line)| !line.by_detectors);
         let asks = set_up.map(|(number, _)| set_up_task(&lines, number).text());
@@ -173,7 +188,8 @@ fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
     let words = work.words::<VolumetricTeller>();
     let (store, resume) = (work.store, task.resume.as_deref());
     let mut volume = work.machine.volumetric()?;
-    let made = volume.calibrate(store, WarmUp::None, resume, &mut Asking(work.person))?;
+    let warm_up = warm_up_of(task)?;
+    let made = volume.calibrate(store, warm_up, resume, &mut Asking(work.person))?;
     Ok(Found {
         figures: json!({
             "geometry": made.id,

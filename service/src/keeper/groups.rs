@@ -7,7 +7,7 @@ use truestage::Machine;
 use truestage::runs::{Group, GroupMove, Judge};
 
 use super::Keeper;
-use super::setup::{Plans, plans, resumed};
+use super::setup::{Plans, Warmth, plans, resumed};
 use crate::problem::{Code, Problem};
 use crate::request::RunKind;
 use crate::view::RunPlanView;
@@ -120,11 +120,23 @@ impl Keeper {
         Problem::new(Code::NotOffered, what, help)
     }
 
-    /// What the run of `kind` of group `at` will do.
-    pub(super) fn plan_of(&self, kind: RunKind, at: usize) -> Result<RunPlanView, Problem> {
+    /// What the run of `kind` of group `at` will do; it becomes warm for so long on its way.
+    pub(super) fn plan_of(
+        &self,
+        kind: RunKind,
+        warm_up_min: Option<f64>,
+        at: usize,
+    ) -> Result<RunPlanView, Problem> {
         let grouped = &self.groups[at];
-        if let Some(plan) = grouped.plans.get(&kind) {
-            return plan.clone();
+        let plans = &grouped.plans;
+        let planned = plans.get(&(kind, Warmth::of(warm_up_min)));
+        // What has no use for it is refused in its own words.
+        if let Some(plan) = planned.or_else(|| plans.get(&(kind, Warmth::Cold))) {
+            let plan = plan.clone()?;
+            return Ok(RunPlanView {
+                seconds_at_least: plan.seconds_at_least + warm_up_min.unwrap_or_default() * 60.0,
+                ..plan
+            });
         }
         let offered = grouped.group.offered().iter().map(|it| it.text());
         let offered: Vec<_> = offered.collect();

@@ -47,6 +47,7 @@ impl Task {
             resume: self.resume.clone(),
             accept_drift: self.request.accept_drift,
             uncompensated: self.request.uncompensated,
+            warm_up_min: self.request.warm_up_min,
             path: self.path.clone(),
         }
     }
@@ -162,7 +163,7 @@ impl Keeper {
         path: Option<JudgedPath>,
     ) -> Result<(), Problem> {
         let at = self.group_of(request.axis.as_deref())?;
-        let plan = self.plan_of(request.kind, at)?;
+        let plan = self.plan_of(request.kind, request.warm_up_min, at)?;
         let plan = path.as_ref().map_or(plan, RunPlanView::of_path);
         self.runs.require_room_for(path.as_ref())?;
         let grouped = &self.groups[at];

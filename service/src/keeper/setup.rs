@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use machine::Stage;
-use truestage::runs::{Group, Moved, Planned, Travel};
+use truestage::runs::{Group, Moved, Planned, Task, Travel};
 use truestage::{Failure, Machine};
 
 use super::events::utc_now;
 use super::mechanics::Mechanics;
-use super::seat::{Seat, Task};
+use super::seat::{self, Seat};
 use crate::problem::Problem;
 use crate::quantity::Quantity;
 use crate::request::RunKind;
@@ -74,7 +74,7 @@ fn seat(machine: &mut Machine, groups: &[Group], name: &str) -> Result<Seat, Fai
         move_timeout: Mechanics::move_timeout(machine, name),
         in_position: Mechanics::in_position(machine, name),
         calibration: None,
-        task: Task::Free,
+        task: seat::Task::Free,
         standing_since: None,
         target: None,
         set_point: None,
@@ -85,18 +85,53 @@ fn seat(machine: &mut Machine, groups: &[Group], name: &str) -> Result<Seat, Fai
     })
 }
 
-/// What the runs of a group would do, or why they cannot be; one that its kind does not have is not there.
-pub(crate) type Plans = BTreeMap<RunKind, Result<RunPlanView, Problem>>;
+/// What the runs of a group would do, or why they cannot be; one that its kind does not have is not there. A calibration
+/// that becomes warm on its way does something else.
+pub(crate) type Plans = BTreeMap<(RunKind, Warmth), Result<RunPlanView, Problem>>;
+
+/// Whether a calibration becomes warm on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Warmth {
+    Cold,
+    Warm,
+}
+
+impl Warmth {
+    pub(crate) const fn of(warm_up_min: Option<f64>) -> Self {
+        match warm_up_min {
+            None => Self::Cold,
+            Some(_) => Self::Warm,
+        }
+    }
+
+    /// For however long.
+    const fn minutes(self) -> Option<f64> {
+        match self {
+            Self::Cold => None,
+            Self::Warm => Some(1.0),
+        }
+    }
+}
 
 /// What the runs of `group` would do now.
 pub(crate) fn plans(machine: &mut Machine, group: &Group) -> Plans {
     let offered = |it: &RunKind| group.offered().contains(&it.stage());
     let kinds = RunKind::ALL.into_iter().filter(offered);
-    let plans = kinds.map(|kind| {
-        let planned = group.planned(machine, kind.stage());
-        (kind, planned.map(shown).map_err(Problem::from))
-    });
-    plans.collect()
+    let mut plans = Plans::new();
+    for kind in kinds {
+        for warmth in [Warmth::Cold, Warmth::Warm] {
+            let task = Task {
+                warm_up_min: warmth.minutes(),
+                ..Task::of(kind.stage())
+            };
+            if group.refuse(&task).is_ok() {
+                let planned = group.planned(machine, &task);
+                let plan = planned.map(shown).map_err(Problem::from);
+                plans.insert((kind, warmth), plan);
+            }
+        }
+    }
+    plans
 }
 
 fn shown(planned: Planned) -> RunPlanView {

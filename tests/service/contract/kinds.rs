@@ -209,6 +209,49 @@ fn line_of(task: &serde_json::Value) -> LineSetUp {
     }
 }
 
+#[test]
+fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
+    with_volume(|bed| {
+        let request = |kind: RunKind, warm_up_min: Option<f64>| RunRequest {
+            warm_up_min,
+            start: false,
+            ..RunRequest::of(kind, None)
+        };
+        let planned = |warm_up_min| {
+            let request = request(RunKind::Calibrate, warm_up_min);
+            let id = bed.client.plan(&anna(), &request).unwrap();
+            bed.client.run(&id, core::time::Duration::ZERO).unwrap().plan
+        };
+        let (cold, warm) = (planned(None), planned(Some(2.5)));
+        assert!(warm.asks.len() > cold.asks.len(), "{warm:?}");
+        assert_eq!(warm.seconds_at_least, cold.seconds_at_least + 150.0);
+        let refused = |kind, minutes| {
+            let problem = bed.client.plan(&anna(), &request(kind, Some(minutes)));
+            let problem = problem.unwrap_err();
+            assert_eq!(problem.exit_code, 2, "{problem:?}");
+            assert!(problem.to_string().contains("warm_up_min"), "{problem}");
+        };
+        refused(RunKind::Calibrate, 0.0);
+        refused(RunKind::Calibrate, 1e5);
+        refused(RunKind::Verify, 1.0);
+        refused(RunKind::Zero, 1.0);
+
+        // What is read after that is among the lines of the run that begins.
+        let begun = RunRequest {
+            start: true,
+            ..request(RunKind::Calibrate, Some(2.5))
+        };
+        let id = bed.client.plan(&anna(), &begun).unwrap();
+        bed.asked(&id);
+        bed.client.abort(&anna(), &id).unwrap();
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Stopped, "{run:?}");
+        let journal = run.journal.expect("it was begun");
+        let journal = std::fs::read_to_string(journal).expect("it can be read");
+        assert!(journal.contains("\"warm\":true"), "{journal}");
+    });
+}
+
 /// Once, and by the library alone.
 #[test]
 fn three_axes_are_calibrated_with_whoever_sets_up_their_lines_and_corrected_from_then_on() {

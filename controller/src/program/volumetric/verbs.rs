@@ -80,16 +80,13 @@ pub(super) fn zeroed() -> Told {
 
 /// How the machine becomes warm.
 pub(super) fn warm_up_of(args: &CalibrateArgs) -> Result<WarmUp, Failure> {
-    match args.warm_up_min {
-        None => Ok(WarmUp::None),
-        Some(minutes) if minutes.is_finite() && minutes > 0.0 && minutes < 1e5 => {
-            Ok(WarmUp::Travel(Duration::from_secs_f64(minutes * 60.0)))
-        }
-        Some(minutes) => Err(Failure::Usage {
-            what: format!("--warm-up-min is {minutes}"),
-            help: "give the minutes for which the axes move to and fro".into(),
-        }),
-    }
+    let Some(minutes) = args.warm_up_min else {
+        return Ok(WarmUp::None);
+    };
+    WarmUp::of_minutes(minutes).ok_or_else(|| Failure::Usage {
+        what: format!("--warm-up-min is {minutes}"),
+        help: "give the minutes for which the axes move to and fro".into(),
+    })
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {

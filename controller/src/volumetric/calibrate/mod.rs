@@ -67,6 +67,9 @@ use known::Known;
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
 
+/// Nobody warms a machine up for longer: seventy days.
+const MINUTES_MAX: f64 = 1e5;
+
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WarmUp {
@@ -77,6 +80,14 @@ pub enum WarmUp {
     Idle(Duration),
     /// All axes go to and fro for so long (ISO 230-3).
     Travel(Duration),
+}
+
+impl WarmUp {
+    /// That all axes go to and fro for so long; `None` where that is no time to wait.
+    pub fn of_minutes(minutes: f64) -> Option<Self> {
+        let is_a_time = minutes > 0.0 && minutes < MINUTES_MAX;
+        is_a_time.then(|| Self::Travel(Duration::from_secs_f64(minutes * 60.0)))
+    }
 }
 
 /// A calibration of three axes that was made, stored and activated.

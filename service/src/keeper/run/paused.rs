@@ -73,7 +73,7 @@ impl Keeper {
         let Some(at) = groups.position(|it| it.group.journals() == journals) else {
             return;
         };
-        let Ok(plan) = self.plan_of(kind, at) else {
+        let Ok(plan) = self.plan_of(kind, None, at) else {
             return;
         };
         let grouped = &self.groups[at];
