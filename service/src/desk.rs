@@ -1,8 +1,8 @@
 //! Where clients come: orders go to the machine's thread, and what it publishes is read.
 
+mod along;
 mod calibrations;
 mod journals;
-mod paths;
 mod runs;
 
 use core::time::Duration;
@@ -26,7 +26,7 @@ use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
 use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
-pub(crate) use paths::PathJudges;
+pub(crate) use along::Judges;
 
 /// How often whoever waits looks.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
@@ -46,8 +46,8 @@ struct Shared {
     store: Store,
     /// Who makes a page of a journal.
     page: Option<Page>,
-    /// Who judges paths, by what follows them.
-    paths: PathJudges,
+    /// Who judges paths and jobs.
+    judges: Judges,
     /// As many copies as orders are unanswered, and this one.
     unanswered: Arc<()>,
 }
@@ -82,7 +82,7 @@ impl Desk {
         fixed: Arc<Fixed>,
         ledger: Ledger,
         store: Store,
-        (page, paths): (Option<Page>, PathJudges),
+        (page, judges): (Option<Page>, Judges),
     ) -> Self {
         let shared = Shared {
             board,
@@ -90,7 +90,7 @@ impl Desk {
             ledger: Mutex::new(ledger),
             store,
             page,
-            paths,
+            judges,
             unanswered: Arc::default(),
         };
         Self {

@@ -1,9 +1,10 @@
 //! What goes to the machine's thread, and what comes back.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio::sync::oneshot;
-use truestage::runs::{Change, Choice, JudgedPath};
+use truestage::runs::{Change, Choice, JudgedJob, JudgedPath};
 
 use crate::problem::Problem;
 use crate::request::{
@@ -30,8 +31,8 @@ pub(crate) enum Order {
     Plan {
         id: String,
         request: RunRequest,
-        /// What it follows, where it is a path.
-        path: Option<JudgedPath>,
+        /// What it follows or does, where that is in the request.
+        judged: Option<Judged>,
     },
     /// A planned run begins.
     Start { run: String },
@@ -86,6 +87,17 @@ impl Order {
             | Self::Calibration(_) => true,
         }
     }
+}
+
+/// What a run goes along, judged before it is planned.
+#[derive(Clone, Debug)]
+pub(crate) enum Judged {
+    Path(JudgedPath),
+    Job {
+        job: JudgedJob,
+        /// It goes on with this journal.
+        resume: Option<PathBuf>,
+    },
 }
 
 /// What an order that was carried out comes to.

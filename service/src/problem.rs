@@ -321,14 +321,13 @@ const fn code_of_store(failure: &machine::records::StoreError) -> Code {
         | Of::OtherKind { .. }
         | Of::Model { .. }
         | Of::Part { .. } => Code::Calibration,
+        Of::AlreadyComplete { .. } | Of::NotResumable { .. } => Code::Refused,
         Of::Io { .. }
         | Of::Damaged { .. }
         | Of::Format { .. }
         | Of::Unsound { .. }
         | Of::Newer { .. }
-        | Of::Leased { .. }
-        | Of::AlreadyComplete { .. }
-        | Of::NotResumable { .. } => Code::Storage,
+        | Of::Leased { .. } => Code::Storage,
     }
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use machine::Stage;
 use serde::{Deserialize, Serialize};
 use truestage::rotary::Way;
+use truestage::runs::Group;
 use utoipa::ToSchema;
 
 mod whole;
@@ -164,17 +165,49 @@ pub enum RunKind {
     Reference,
     /// Follow a path of three axes, given in `path`.
     Path,
+    /// The same as the first of several parts: what the detectors see meanwhile is not corrected but kept, so that all
+    /// later parts are made like this one.
+    FirstPart,
+    /// Do a job of one axis, given in `job`.
+    Job,
 }
 
 impl RunKind {
     /// All of them.
-    pub(crate) const ALL: [Self; 5] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Zero,
         Self::Calibrate,
         Self::Verify,
         Self::Reference,
         Self::Path,
+        Self::FirstPart,
+        Self::Job,
     ];
+
+    /// Whether `group` has it.
+    pub(crate) fn is_offered(self, group: &Group) -> bool {
+        match self {
+            Self::Path | Self::FirstPart => group.follows_paths(),
+            Self::Job => group.does_jobs(),
+            Self::Zero | Self::Calibrate | Self::Verify | Self::Reference => {
+                group.offered().contains(&self.stage())
+            }
+        }
+    }
+
+    /// Whether what it goes along is in its request, and in no journal.
+    pub(crate) const fn has_rows(self) -> bool {
+        match self {
+            Self::Path | Self::FirstPart | Self::Job => true,
+            Self::Zero | Self::Calibrate | Self::Verify | Self::Reference => false,
+        }
+    }
+
+    /// As it is written.
+    pub(crate) fn word(self) -> String {
+        let value = serde_json::to_value(self).unwrap_or_default();
+        value.as_str().unwrap_or_default().to_owned()
+    }
 
     /// What procedures call it.
     pub(crate) const fn stage(self) -> Stage {
@@ -183,7 +216,7 @@ impl RunKind {
             Self::Calibrate => Stage::Calibrate,
             Self::Verify => Stage::Verify,
             Self::Reference => Stage::Reference,
-            Self::Path => Stage::Job,
+            Self::Path | Self::FirstPart | Self::Job => Stage::Job,
         }
     }
 }
@@ -215,6 +248,17 @@ pub struct RunRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 1000000)]
     pub path: Option<String>,
+    /// Job: what `truestage run JOB.toml` takes, as a text. At most 2000 points, repetitions counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 1000000)]
+    pub job: Option<String>,
+    /// Job: also to points beyond the calibrated range of its axis.
+    #[serde(default)]
+    pub beyond: bool,
+    /// Job: goes on with this journal of the same job, at the point after the last one that it went on from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub resume: Option<String>,
     /// Starts it at once.
     #[serde(default)]
     pub start: bool,
@@ -230,6 +274,9 @@ impl RunRequest {
             uncompensated: false,
             warm_up_min: None,
             path: None,
+            job: None,
+            beyond: false,
+            resume: None,
             start: true,
         }
     }

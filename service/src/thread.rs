@@ -19,7 +19,7 @@ use truestage::runs::{Choice, Found, Group, Teller};
 use truestage::{Failure, Machine, groups};
 use wire::cia402::PowerState;
 
-use crate::desk::{Desk, Page, PathJudges};
+use crate::desk::{Desk, Judges, Page};
 use crate::keeper::{Attending, Job, Keeper, Mechanics, Mode, RunTask, cause_of, fixed, seats};
 use crate::ledger::{Ledger, LedgerError};
 use crate::manager::{Manager, Watch};
@@ -143,7 +143,7 @@ impl Service {
     }
 }
 
-type Told = Sender<(Arc<Fixed>, Store, (Option<Page>, PathJudges))>;
+type Told = Sender<(Arc<Fixed>, Store, (Option<Page>, Judges))>;
 
 /// All that the machine's thread does.
 fn keep(
@@ -161,7 +161,7 @@ fn keep(
     let groups = groups(machine.config());
     let fixed = Arc::new(fixed(&mut machine, &groups)?);
     let seats = seats(&mut machine, &groups)?;
-    let paths = path_judges(&mut machine, &groups)?;
+    let judges = judges(&mut machine, &groups)?;
     let mut keeper = Keeper::new(inbox, input, seats, teller.clone());
     keeper.add_groups(&mut machine, groups);
     machine.observe(Box::new(keeper.note_taker()));
@@ -185,7 +185,7 @@ fn keep(
     let _ = told.send((
         fixed,
         kept.store.clone(),
-        (kept.teller.as_ref().map(|it| it.page), paths),
+        (kept.teller.as_ref().map(|it| it.page), judges),
     ));
     let ended = kept.live();
     kept.keeper.borrow_mut().dismiss();
@@ -193,12 +193,17 @@ fn keep(
     ended
 }
 
-/// Who judges paths of `machine`.
-fn path_judges(machine: &mut Machine, groups: &[Group]) -> Result<PathJudges, Failure> {
-    let mut judges = PathJudges::new();
+/// Who judges paths and jobs of `machine`.
+fn judges(machine: &mut Machine, groups: &[Group]) -> Result<Judges, Failure> {
+    let mut judges = Judges::default();
     for group in groups {
         if let Some(judge) = group.path_judge(machine)? {
-            judges.push((group.name.clone(), Mutex::new(judge)));
+            let judge = Mutex::new(judge);
+            judges.paths.push((group.name.clone(), judge));
+        }
+        // A job says itself which axis does it.
+        if judges.jobs.is_none() {
+            judges.jobs = group.job_judge(machine).map(Mutex::new);
         }
     }
     Ok(judges)
@@ -416,7 +421,8 @@ impl Kept {
         for group in groups {
             for kind in RunKind::ALL {
                 let stage = kind.stage();
-                if !group.is_resumed(self.machine.config(), stage) {
+                let is_resumed = group.is_resumed(self.machine.config(), stage);
+                if kind.has_rows() || !is_resumed {
                     continue;
                 }
                 let found = self.store.interrupted_run(stage.text(), group.journals());

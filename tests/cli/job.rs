@@ -8,6 +8,7 @@ use serde_json::Value;
 use tests::Edit;
 
 use crate::programs::{Bench, check_says, live_rigs, number, text};
+use crate::serve::keep;
 
 const JOB: &str = include_str!("../../configs/jobs/linear.toml");
 
@@ -135,6 +136,60 @@ fn goes_on(bench: &Bench) {
     process.end().with_code(130);
     let path = bench.run(&["run", "machine.toml", "path.csv", "--resume"]);
     assert!(text(&path.with_code(2)["error"]).contains("this is a path"));
+}
+
+#[test]
+fn a_kept_axis_does_a_job_as_it_does_without_a_service() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        write(&bench, "job.toml", JOB);
+        bench.run(&["calibrate"]).with_code(0);
+        let words = ["run", "machine.toml", "job.toml", "--yes"];
+        let here = bench.run(&words).with_code(0);
+        let service = keep(&bench);
+        refused(&bench);
+        let nobody = bench.run(&words[..3]).with_code(2);
+        assert!(text(&nobody["error"]).contains("--yes"), "{nobody}");
+        let there = bench.run(&words).with_code(0);
+        let keys = |value: &Value| {
+            let keys = value.as_object().expect("an object").keys();
+            keys.cloned().collect::<Vec<_>>()
+        };
+        assert_eq!(keys(&there), keys(&here));
+        assert_eq!((points(&here).len(), points(&there).len()), (12, 12));
+        for (here, there) in points(&here).iter().zip(points(&there)) {
+            assert_eq!(keys(there), keys(here));
+            for key in ["name", "repetition", "set_point_mm"] {
+                assert_eq!(there[key], here[key], "{there}");
+            }
+        }
+        interrupted_there(&bench);
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+        assert_eq!(bench.stop(), Some(0));
+    }
+}
+
+/// Ctrl-C at the client while the axis waits: the job is paused, and goes on as the same job only.
+fn interrupted_there(bench: &Bench) {
+    let long = JOB.edit("after_s = 0.5", "after_s = 80000.0");
+    write(bench, "long.toml", &long);
+    let before = jobs(bench).len();
+    let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes"]);
+    process.wait_until(|| jobs(bench).len() > before && reached(bench) >= 2);
+    process.signal(Signal::SIGINT);
+    let ended = process.end();
+    assert!(ended.said.contains("--resume"), "{ended:?}");
+    ended.with_code(130);
+    let other = ["run", "machine.toml", "job.toml", "--yes", "--resume"];
+    let refused = bench.run(&other).with_code(3);
+    let said = text(&refused["error"]);
+    assert!(said.contains("is now `after 0.5 s`"), "{said}");
+    let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes", "--resume"]);
+    process.wait_until(|| reached(bench) >= 3);
+    process.signal(Signal::SIGINT);
+    process.end().with_code(130);
+    assert_eq!(jobs(bench).len(), before + 1, "it went on with the same one");
 }
 
 /// The journals of jobs, the newest one last.

@@ -3,6 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::Write;
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::MutexGuard;
@@ -131,6 +132,13 @@ impl Live {
         command
     }
 
+    /// A verb that does not use the machine itself.
+    fn run_nowhere(&self, words: &[&str]) -> Ended {
+        let mut command = Command::new(program("truestage"));
+        command.current_dir(self.folder.path()).args(words);
+        Process::start(command.arg("--json")).end()
+    }
+
     fn run(&self, words: &[&str]) -> Ended {
         Process::start(&mut self.command(words)).end()
     }
@@ -241,7 +249,30 @@ fn three_axes_are_zeroed_calibrated_verified_and_moved_from_process_to_process()
         remembers(&live);
         moves(&live);
         follows(&live);
+        kept(&live, &geometry);
     }
+}
+
+/// Through a service paths are followed and refused as without one, and calibrations are chosen.
+fn kept(live: &Live, geometry: &Value) {
+    let words = ["serve", "machine.toml", "--listen", "unix:truestage.sock"];
+    let mut service = Process::start(&mut live.command(&words));
+    let socket = live.folder.path().join("truestage.sock");
+    service.wait_until(|| {
+        let answers = UnixStream::connect(&socket).is_ok();
+        answers && live.run_nowhere(&["status"]).code == Some(0)
+    });
+    follows(live);
+    let id = text(geometry);
+    let chosen = live.run_nowhere(&["cal", "activate", "machine.toml", &id[..12]]);
+    let chosen = chosen.with_code(0);
+    assert_eq!((&chosen["axis"], &chosen["active"]), (&"volume".into(), geometry));
+    let never = live.run_nowhere(&["cal", "rollback", "machine.toml", "--axis", "volume"]);
+    check_error(&never.with_code(2), &["volume", "earlier"]);
+    let words = ["calibrate", "machine.toml", "--yes", "--warm-up-min=-1"];
+    check_error(&live.run(&words).with_code(2), &["warm"]);
+    service.signal(Signal::SIGTERM);
+    assert_eq!(service.end().code, Some(0));
 }
 
 /// Verbs that need what was never measured, and words that mean nothing.

@@ -1,6 +1,7 @@
 //! The contract of a motion, line by line, on every interface.
 
 mod calibrations;
+mod jobs;
 mod jogs;
 mod kinds;
 mod machine;

@@ -7,14 +7,16 @@ use serde_json::json;
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::linear::{LinearTeller, VerifyOptions};
+use crate::linear::job::asked::Asking;
+use crate::linear::job::judge::job_judge;
+use crate::linear::{Job, LinearTeller, VerifyOptions};
 use crate::run::missing;
 use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
-    offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
-    resumed: |_, _, stage| matches!(stage, Stage::Calibrate | Stage::Verify),
+    offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify, Stage::Job],
+    resumed: |_, _, stage| matches!(stage, Stage::Calibrate | Stage::Verify | Stage::Job),
     refuse: Task::without_warm_up,
     planned,
     perform,
@@ -22,6 +24,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     with_companions: |_, chosen| Ok(chosen),
     usable,
     paths: None,
+    jobs: Some(|machine| job_judge(machine.config().clone(), machine.config_hash().clone())),
     moves: None,
 };
 
@@ -33,6 +36,10 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
 fn planned(machine: &mut Machine, axis: &str, task: &Task) -> Result<Planned, Failure> {
     let stage_of = machine.linear(axis)?;
     let stage = task.stage;
+    if stage == Stage::Job {
+        // What a job will do is known with it.
+        return Ok(Planned::default());
+    }
     if stage == Stage::Zero {
         let zero = stage_of.config().zero.as_ref();
         return zero
@@ -53,7 +60,8 @@ fn perform(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     match task.stage {
         Stage::Calibrate => calibrate(work, axis, task),
         Stage::Verify => verify(work, axis, task),
-        Stage::Zero | Stage::Reference | Stage::Job => zero(work, axis),
+        Stage::Job => do_job(work, axis, task),
+        Stage::Zero | Stage::Reference => zero(work, axis),
     }
 }
 
@@ -114,6 +122,31 @@ fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
         }),
         told: words.map(|it| (it.verified)(axis, &verified, compensated)),
         bad: verified.out_of_tolerance(axis).filter(|_| compensated),
+    })
+}
+
+fn do_job(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
+    let words = work.words::<LinearTeller>();
+    let job = task.job.as_ref().and_then(|it| it.of::<Job>());
+    let job = job.ok_or_else(|| Failure::Usage {
+        what: "a job without points".into(),
+        help: "give them".into(),
+    })?;
+    let mut person = Asking(work.person);
+    let mut stage = work.machine.linear(axis)?;
+    let done = match &task.resume {
+        None => stage.run_job(work.store, job, &mut person),
+        Some(journal) => stage.resume_job(work.store, job, journal, &mut person),
+    }?;
+    Ok(Found {
+        figures: json!({
+            "points": done.reached.len(),
+            "points_before": done.before,
+            "calibration": done.calibration,
+            "journal": done.journal,
+        }),
+        told: words.map(|it| (it.job_done)(job, &done)),
+        bad: None,
     })
 }
 

@@ -1,6 +1,7 @@
 //! What a linear axis gave, in the words of the command line.
 
-use crate::linear::{Calibrated, Moved, Verified, Zeroed};
+use crate::linear::job::JobDone;
+use crate::linear::{Calibrated, Job, Moved, Verified, Zeroed};
 use crate::runs::Told;
 
 /// Who says it ([`Teller::of`](crate::runs::Teller::of)).
@@ -14,4 +15,6 @@ pub struct LinearTeller {
     pub verified: fn(axis: &str, verified: &Verified, compensated: bool) -> Told,
     /// A move, and the calibration that corrected it.
     pub moved: fn(axis: &str, moved: &Moved, calibration: Option<&str>) -> Told,
+    /// A job that was done.
+    pub job_done: fn(job: &Job, done: &JobDone) -> Told,
 }

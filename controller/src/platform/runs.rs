@@ -26,6 +26,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     with_companions: |_, chosen| Ok(chosen),
     usable,
     paths: None,
+    jobs: None,
     moves: Some(&MOVES),
 };
 

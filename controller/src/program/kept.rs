@@ -3,6 +3,7 @@
 //! A verb first tries to take the machine. Whoever has it says in its lease where it can be asked; what is wrong
 //! with the command line itself has been refused by then.
 
+mod jobs;
 mod motions;
 
 use std::path::Path;
@@ -173,7 +174,9 @@ impl Service {
         resume: Option<&Path>,
         waiting: Waiting<'_>,
     ) -> Result<Value, Failure> {
-        request["kind"] = json!(stage.text());
+        if request["kind"].is_null() {
+            request["kind"] = json!(stage.text());
+        }
         let (run, verb) = match resume {
             None => (
                 ask(&self.at, "POST", "/v1/runs", &request.to_string())?,

@@ -4,6 +4,7 @@ use machine::Stage;
 use machine::records::Store;
 
 use super::choice::{Change, Choice, changes_of, chosen_of, write};
+use super::job::JobJudge;
 use super::path::PathJudge;
 use super::person::Person;
 use super::task::{Found, Planned, Task, Work};
@@ -67,12 +68,17 @@ pub(crate) struct GroupRuns {
     pub(crate) usable: fn(&mut Machine, &Store, &[Change]) -> Result<(), Failure>,
     /// Who judges paths that it follows, where it follows some.
     pub(crate) paths: Option<MakesPathJudge>,
+    /// Who judges jobs that its axes do, where they do some.
+    pub(crate) jobs: Option<MakesJobJudge>,
     /// How it is moved as one, where it is.
     pub(crate) moves: Option<&'static GroupMoves>,
 }
 
 /// Makes who judges paths.
 pub(crate) type MakesPathJudge = fn(&mut Machine) -> Result<PathJudge, Failure>;
+
+/// Makes who judges jobs.
+pub(crate) type MakesJobJudge = fn(&Machine) -> JobJudge;
 
 /// Which calibration each axis uses.
 pub(crate) type InUse = Vec<(String, Option<String>)>;
@@ -203,6 +209,21 @@ impl Group {
     /// When its axes are not made for it.
     pub fn path_judge(&self, machine: &mut Machine) -> Result<Option<PathJudge>, Failure> {
         self.runs.paths.map(|it| it(machine)).transpose()
+    }
+
+    /// Whether it follows paths.
+    pub const fn follows_paths(&self) -> bool {
+        self.runs.paths.is_some()
+    }
+
+    /// Who judges jobs that its axes do; `None` where they do none.
+    pub fn job_judge(&self, machine: &Machine) -> Option<JobJudge> {
+        self.runs.jobs.map(|it| it(machine))
+    }
+
+    /// Whether its axes do jobs.
+    pub const fn does_jobs(&self) -> bool {
+        self.runs.jobs.is_some()
     }
 
     fn moves(&self) -> Result<&'static GroupMoves, Failure> {

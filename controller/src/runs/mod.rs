@@ -6,6 +6,7 @@
 
 mod choice;
 mod group;
+mod job;
 mod path;
 mod person;
 mod task;
@@ -14,6 +15,7 @@ mod together;
 
 pub use choice::{Change, Choice};
 pub use group::{Group, Moved};
+pub use job::{AskedJob, JobJudge, JudgedJob};
 pub use path::{JudgedPath, PathJudge};
 pub use person::{Person, Question};
 pub use task::{Found, Planned, Task, Travel};

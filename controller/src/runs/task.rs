@@ -9,6 +9,7 @@ use machine::records::Store;
 use serde_json::Value;
 use units::{Metres, Radians};
 
+use super::job::JudgedJob;
 use super::path::JudgedPath;
 use super::person::Person;
 use super::teller::{Teller, Told};
@@ -31,6 +32,10 @@ pub struct Task {
     pub warm_up_min: Option<f64>,
     /// The path that is followed, where it is one.
     pub path: Option<JudgedPath>,
+    /// What the detectors see along the path is not corrected, but kept for the parts that follow.
+    pub first_part: bool,
+    /// The job that is done, where it is one.
+    pub job: Option<JudgedJob>,
 }
 
 impl Task {
@@ -43,6 +48,8 @@ impl Task {
             uncompensated: false,
             warm_up_min: None,
             path: None,
+            first_part: false,
+            job: None,
         }
     }
 

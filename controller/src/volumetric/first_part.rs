@@ -20,6 +20,7 @@ use crate::failure::Failure;
 use crate::store::Store;
 use crate::volumetric::MemoryName;
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::path::PathFollowed;
 use crate::volumetric::settings::work_volume;
 use crate::volumetric::{
     Mover, Remembered, VolumetricCorrection, VolumetricFailure, VolumetricRecords, VolumetricState,
@@ -139,6 +140,21 @@ impl WorkVolume<'_> {
         let (correction, recorder) = FirstPartCorrection::new(self.core.config, state)?;
         let mover = self.mover(Box::new(correction))?;
         Ok((mover, FirstPart { recorder, records }))
+    }
+
+    /// Follows `points` as a first part, by what [`Self::first_part`] gave, and keeps it.
+    ///
+    /// # Errors
+    /// Those of [`Self::follow`] and [`Self::keep_part`].
+    pub(crate) fn follow_part(
+        &mut self,
+        store: &Store,
+        (mut mover, part): (Mover, FirstPart),
+        points: Vec<Vec<Metres>>,
+    ) -> Result<(PathFollowed, Remembered), Failure> {
+        let followed = self.follow(&mut mover, points, true, || part.recorder.listen())?;
+        let kept = self.keep_part(store, mover, part)?;
+        Ok((followed, kept))
     }
 
     /// The part is made: stores and activates what `mover` was left with as the second memory.

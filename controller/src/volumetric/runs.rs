@@ -39,6 +39,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     with_companions: chosen::with_companions,
     usable: chosen::usable,
     paths: Some(paths),
+    jobs: None,
     moves: Some(&MOVES),
 };
 
@@ -160,7 +161,14 @@ fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
     };
     let (points, is_corrected) = (judged.path.points.clone(), !task.uncompensated);
     let mut volume = work.machine.volumetric()?;
-    let followed = volume.follow_stored(work.store, points, is_corrected)?;
+    let (followed, kept) = match task.first_part {
+        false => (volume.follow_stored(work.store, points, is_corrected)?, None),
+        true => {
+            let ready = volume.first_part(work.store)?;
+            let (followed, kept) = volume.follow_part(work.store, ready, points)?;
+            (followed, Some(kept))
+        }
+    };
     let corrected = followed.corrected.as_ref();
     Ok(Found {
         figures: json!({
@@ -168,8 +176,9 @@ fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "corrected": corrected.is_some(),
             "largest_correction_um": corrected.map(|it| it.largest.map(|it| it.um())),
             "u_max_um": corrected.map(|it| it.u.map(|it| it.um())),
+            "memory": kept.as_ref().map(|it| &it.id),
         }),
-        told: words.map(|it| (it.followed)(&followed, &judged.path)),
+        told: words.map(|it| (it.followed)(&followed, &judged.path, kept.as_ref())),
         bad: None,
     })
 }

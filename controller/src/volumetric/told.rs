@@ -3,7 +3,7 @@
 use machine::engine::{CsvPath, Live};
 
 use crate::runs::Told;
-use crate::volumetric::VolumetricCalibrated;
+use crate::volumetric::{Remembered, VolumetricCalibrated};
 use crate::volumetric::path::PathFollowed;
 use crate::volumetric::reference::VolumetricReferenced;
 use crate::volumetric::verify::VolumetricVerified;
@@ -21,6 +21,7 @@ pub struct VolumetricTeller {
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
     /// A corrected move that was made, by its last period.
     pub moved: fn(live: &Live) -> Told,
-    /// A path that was followed, and where it was farthest from the straight joins of its rows.
-    pub followed: fn(followed: &PathFollowed, path: &CsvPath) -> Told,
+    /// A path that was followed, what joined its rows, and what later parts are made with when it was the first.
+    pub followed:
+        fn(followed: &PathFollowed, path: &CsvPath, kept: Option<&Remembered>) -> Told,
 }

@@ -41,6 +41,13 @@ impl Join {
         Some(Self::parse(said))
     }
 
+    /// The file `rows` with a comment above it that says so. A file that says another join itself is none that was
+    /// judged by this one.
+    pub fn said_above(self, rows: &str) -> String {
+        let rows = rows.strip_prefix('\u{feff}').unwrap_or(rows);
+        format!("# {MARK} {self}\n{rows}")
+    }
+
     fn parse(said: &str) -> Result<Self, ()> {
         let mut words = said.split_whitespace();
         match (words.next(), words.next(), words.next()) {
@@ -78,7 +85,10 @@ mod tests {
         ] {
             assert_eq!(Join::of_comment(text), expected, "{text}");
             if let Some(Ok(join)) = expected {
-                assert_eq!(Join::of_comment(&format!("# join: {join}")), Some(Ok(join)));
+                let above = join.said_above("\u{feff}time_s,x_mm");
+                let (comment, rows) = above.split_once('\n').unwrap();
+                assert_eq!(Join::of_comment(comment), Some(Ok(join)));
+                assert_eq!(rows, "time_s,x_mm");
             }
         }
     }

@@ -49,7 +49,7 @@ impl Desk {
     }
 
     /// Only what is in the folder has a name: a path leads nowhere else.
-    fn journal_path(&self, name: &str) -> Result<PathBuf, Problem> {
+    pub(super) fn journal_path(&self, name: &str) -> Result<PathBuf, Problem> {
         if self.journal_names()?.iter().any(|it| it == name) {
             return Ok(self.shared.store.runs().join(format!("{name}.jsonl")));
         }

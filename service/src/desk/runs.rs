@@ -4,10 +4,8 @@ use core::time::Duration;
 use std::thread;
 use std::time::Instant;
 
-use truestage::runs::JudgedPath;
-
 use super::{Desk, LOOK_EVERY};
-use crate::order::Order;
+use crate::order::{Judged, Order};
 use crate::problem::{Code, Problem};
 use crate::request::{AnswerRequest, Caller, RunRequest};
 use crate::view::RunView;
@@ -20,20 +18,28 @@ impl Desk {
     /// When it is refused; nothing has moved then.
     pub fn plan_run(&self, caller: &Caller, request: &RunRequest) -> Result<String, Problem> {
         let id = self.next_run();
-        let order = Self::plan_order(&id, request, self.judge_path(request)?);
+        let order = Self::plan_order(&id, request, self.judge_run(request)?);
         self.done(caller, order)?;
         Ok(id)
     }
 
-    /// The rows of a path stay here.
-    pub(crate) fn plan_order(id: &str, request: &RunRequest, path: Option<JudgedPath>) -> Order {
+    /// The text of what was judged stays here.
+    pub(crate) fn plan_order(id: &str, request: &RunRequest, judged: Option<Judged>) -> Order {
+        let axis = match &judged {
+            // It says itself which one does it.
+            Some(Judged::Job { job, .. }) => Some(job.axis.clone()),
+            Some(Judged::Path(_)) | None => request.axis.clone(),
+        };
+        let request = RunRequest {
+            axis,
+            path: None,
+            job: None,
+            ..request.clone()
+        };
         Order::Plan {
             id: id.to_owned(),
-            request: RunRequest {
-                path: None,
-                ..request.clone()
-            },
-            path,
+            request,
+            judged,
         }
     }
 

@@ -27,8 +27,9 @@ pub(super) fn needed(method: &Method, path: &str) -> Role {
 /// What a run of this kind needs: those that change how positions are corrected are for commissioners.
 pub(super) const fn of_run(kind: RunKind) -> Role {
     match kind {
-        RunKind::Zero | RunKind::Verify | RunKind::Path => Role::Operator,
-        RunKind::Calibrate | RunKind::Reference => Role::Commissioner,
+        RunKind::Zero | RunKind::Verify | RunKind::Path | RunKind::Job => Role::Operator,
+        // What a first part leaves is kept for all later ones.
+        RunKind::Calibrate | RunKind::Reference | RunKind::FirstPart => Role::Commissioner,
     }
 }
 

@@ -138,13 +138,10 @@ impl Keeper {
                 ..plan
             });
         }
-        let offered = grouped.group.offered().iter().map(|it| it.text());
-        let offered: Vec<_> = offered.collect();
-        let what = format!(
-            "{} has no run `{}`",
-            grouped.group.name,
-            kind.stage().text()
-        );
+        let offered = RunKind::ALL.into_iter();
+        let offered = offered.filter(|it| it.is_offered(&grouped.group));
+        let offered: Vec<_> = offered.map(RunKind::word).collect();
+        let what = format!("{} has no run `{}`", grouped.group.name, kind.word());
         let help = format!("it has {}", offered.join(", "));
         Err(Problem::new(Code::NotOffered, what, help))
     }

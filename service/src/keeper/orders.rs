@@ -46,8 +46,12 @@ impl Keeper {
                 .map(|()| Answer::Done),
             Order::Jog { id, request } => self.jog(machine, &id, by, &request).map(Answer::Named),
             Order::Renew { motion } => self.renew(machine.now(), &motion).map(|()| Answer::Done),
-            Order::Plan { id, request, path } => {
-                let planned = self.plan_run(&id, by, &request, path);
+            Order::Plan {
+                id,
+                request,
+                judged,
+            } => {
+                let planned = self.plan_run(&id, by, &request, judged);
                 let started = planned.and_then(|()| match request.start {
                     true => self.start_planned(machine, &id),
                     false => Ok(()),

@@ -8,12 +8,14 @@ use std::sync::Arc;
 
 use machine::{Machine, Stage};
 use serde_json::json;
-use truestage::runs::{self, Found, Group, JudgedPath};
+use truestage::runs::{self, Found, Group};
 
 use super::mechanics::Mechanics;
+use super::setup::shown;
 use super::seat::Task as SeatTask;
 use super::stop::{cause_of, stopped_by};
 use super::{Job, Keeper, Mode};
+use crate::order::Judged;
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::snapshot::CalibrationInUse;
@@ -21,7 +23,7 @@ use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
 
 /// So many runs are kept in the snapshot.
 const KEPT: usize = 64;
-/// So many paths may wait.
+/// So many paths and jobs may wait.
 const PATHS: usize = 4;
 
 /// What the machine's thread is to do for a run.
@@ -35,8 +37,8 @@ pub(crate) struct Task {
     pub(crate) is_resumed: bool,
     /// The journal that it goes on with.
     pub(crate) resume: Option<PathBuf>,
-    /// The path that it follows.
-    path: Option<JudgedPath>,
+    /// The path that it follows, or the job that it does.
+    judged: Option<Judged>,
 }
 
 impl Task {
@@ -48,7 +50,15 @@ impl Task {
             accept_drift: self.request.accept_drift,
             uncompensated: self.request.uncompensated,
             warm_up_min: self.request.warm_up_min,
-            path: self.path.clone(),
+            first_part: self.request.kind == RunKind::FirstPart,
+            path: match &self.judged {
+                Some(Judged::Path(path)) => Some(path.clone()),
+                Some(Judged::Job { .. }) | None => None,
+            },
+            job: match &self.judged {
+                Some(Judged::Job { job, .. }) => Some(job.clone()),
+                Some(Judged::Path(_)) | None => None,
+            },
         }
     }
 }
@@ -90,6 +100,14 @@ impl Run {
     }
 }
 
+/// What is done along it.
+fn plan_along(judged: &Judged) -> RunPlanView {
+    match judged {
+        Judged::Path(path) => RunPlanView::of_path(path),
+        Judged::Job { job, .. } => shown(job.planned.clone()),
+    }
+}
+
 /// All runs.
 #[derive(Debug, Default)]
 pub(super) struct Runs {
@@ -124,13 +142,13 @@ impl Runs {
         self.published = None;
     }
 
-    /// Paths are long, and wait in memory until they are followed.
-    fn require_room_for(&self, path: Option<&JudgedPath>) -> Result<(), Problem> {
-        let waiting = self.kept.iter().filter(|it| it.task.path.is_some());
-        if path.is_none() || waiting.count() < PATHS {
+    /// Paths are long, and wait in memory until they are followed; so do jobs.
+    fn require_room_for(&self, judged: Option<&Judged>) -> Result<(), Problem> {
+        let waiting = self.kept.iter().filter(|it| it.task.judged.is_some());
+        if judged.is_none() || waiting.count() < PATHS {
             return Ok(());
         }
-        let what = format!("{PATHS} paths are planned or under way");
+        let what = format!("{PATHS} paths and jobs are planned or under way");
         Err(Problem::new(Code::Busy, what, "start them, or abort one"))
     }
 
@@ -160,12 +178,12 @@ impl Keeper {
         id: &str,
         by: &str,
         request: &RunRequest,
-        path: Option<JudgedPath>,
+        judged: Option<Judged>,
     ) -> Result<(), Problem> {
         let at = self.group_of(request.axis.as_deref())?;
         let plan = self.plan_of(request.kind, request.warm_up_min, at)?;
-        let plan = path.as_ref().map_or(plan, RunPlanView::of_path);
-        self.runs.require_room_for(path.as_ref())?;
+        let plan = judged.as_ref().map_or(plan, plan_along);
+        self.runs.require_room_for(judged.as_ref())?;
         let grouped = &self.groups[at];
         let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let task = Task {
@@ -173,8 +191,11 @@ impl Keeper {
             request: request.clone(),
             is_resumed: grouped.is_resumed(request.kind),
             group,
-            resume: None,
-            path,
+            resume: match &judged {
+                Some(Judged::Job { resume, .. }) => resume.clone(),
+                Some(Judged::Path(_)) | None => None,
+            },
+            judged,
         };
         task.group.refuse(&task.of_procedure())?;
         let of = (task.group.name.as_str(), task.group.axes.clone());
@@ -419,7 +440,7 @@ impl Keeper {
         };
         change(&mut run.view);
         if run.view.state.is_end() {
-            run.task.path = None;
+            run.task.judged = None;
         }
         let data = json!(run.view);
         self.events.push("run", id, data);

@@ -132,7 +132,9 @@ impl Seat {
             _ if is_faulted => AxisState::ErrorStop,
             Task::Stopping => AxisState::Stopping,
             Task::Jog(_) => AxisState::ContinuousMotion,
-            Task::Together(_) | Task::Run(_, RunKind::Path) => AxisState::SynchronizedMotion,
+            Task::Together(_) | Task::Run(_, RunKind::Path | RunKind::FirstPart) => {
+                AxisState::SynchronizedMotion
+            }
             Task::Run(_, RunKind::Zero) => AxisState::Homing,
             // Its run waits for a person with his hands in the machine.
             Task::Run(..) if power != Some(PowerState::OperationEnabled) => AxisState::Disabled,

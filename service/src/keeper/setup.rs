@@ -115,7 +115,7 @@ impl Warmth {
 
 /// What the runs of `group` would do now.
 pub(crate) fn plans(machine: &mut Machine, group: &Group) -> Plans {
-    let offered = |it: &RunKind| group.offered().contains(&it.stage());
+    let offered = |it: &RunKind| it.is_offered(group);
     let kinds = RunKind::ALL.into_iter().filter(offered);
     let mut plans = Plans::new();
     for kind in kinds {
@@ -134,7 +134,7 @@ pub(crate) fn plans(machine: &mut Machine, group: &Group) -> Plans {
     plans
 }
 
-fn shown(planned: Planned) -> RunPlanView {
+pub(super) fn shown(planned: Planned) -> RunPlanView {
     RunPlanView {
         points: planned.points,
         travel: planned.travel.map(|it| match it {

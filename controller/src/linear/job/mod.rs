@@ -10,7 +10,9 @@
 //!
 //! Absent: points of several axes at once, a speed of its own, and branches.
 
+pub(crate) mod asked;
 mod config;
+pub(crate) mod judge;
 pub(crate) mod kept;
 mod load;
 mod operator;

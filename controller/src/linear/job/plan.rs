@@ -6,7 +6,7 @@ use compensator::budget::Combined;
 use compensator::error_table::{Compensation, ErrorTable};
 use units::{Approach, Metres};
 
-use crate::config::{Loaded, MachineConfig};
+use crate::config::{ConfigHash, Loaded, MachineConfig};
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::linear::course::{Corrected, Course, set_point_of, started};
@@ -52,13 +52,25 @@ impl JobPlan {
     /// No calibration is in use, or it belongs to another machine or breaks a limit; a target or set-point outside
     /// the soft limits; a target outside the calibrated range where that is refused.
     pub fn of(job: &Job, loaded: &Loaded, store: &Store) -> Result<Self, Failure> {
-        let in_use = stored_course(loaded, &job.axis, store)?;
+        Self::on(job, (&loaded.config, &loaded.hash), store)
+    }
+
+    /// The same on the machine of this configuration.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn on(
+        job: &Job,
+        (config, hash): (&MachineConfig, &ConfigHash),
+        store: &Store,
+    ) -> Result<Self, Failure> {
+        let in_use = stored_course((config, hash), &job.axis, store)?;
         let (id, course) = in_use.ok_or_else(|| uncalibrated(&job.axis))?;
         let compensation = course.compensation.as_ref();
         let compensation = compensation.expect("a stored course has what corrects it");
         let planner = Planner {
             job,
-            config: &loaded.config,
+            config,
             compensation,
             course: &course,
         };

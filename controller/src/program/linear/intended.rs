@@ -67,7 +67,7 @@ fn stored_corrected(
     store: &Store,
     (axis, target): (&str, Metres),
 ) -> Result<Corrected, Failure> {
-    let course = stored_course(loaded, axis, store)?;
+    let course = stored_course((&loaded.config, &loaded.hash), axis, store)?;
     Ok(course.map_or(Corrected::No, |(_, course)| course.corrected(target)))
 }
 

@@ -7,19 +7,23 @@ use serde_json::{Value, json};
 use units::{Metres, Short};
 
 use crate::linear::job::JobDone;
+use crate::linear::job::asked::GO_ON;
 use crate::linear::job::kept::{Stop, goes_on_at};
 use crate::linear::job::plan::PlannedPoint;
 use crate::linear::{Job, JobOperator, JobPlan, Reached};
 use crate::ports::Use;
 use crate::program::MachineArgs;
+use crate::program::answering::{Asked as AskedOf, entered};
 use crate::program::data_text::{name_of, read};
+use crate::program::exchange::plain;
 use crate::program::json as to_json;
+use crate::program::kept::or_by_its_service;
 use crate::program::linear::{moved, uncertainty};
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
-use crate::{Agreed, Failure, config};
+use crate::{Failure, config};
 
 /// What is asked of a job besides doing it.
 #[derive(Clone, Debug)]
@@ -83,13 +87,7 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output:
     let job = Job::parse(&text, &name_of(file), &loaded.config)?;
     let store = loaded.config.machine.store();
     let plan = JobPlan::of(&job, &loaded, &store)?;
-    let agreed = Agreed {
-        uncompensated: false,
-        beyond: options.beyond,
-    };
-    for it in &plan.points {
-        it.corrected.require(&job.axis, it.target, agreed)?;
-    }
+    plan.require(&job.axis, options.beyond)?;
     let goes_on = GoesOn::of(options.resume.as_ref(), &store, &job, &plan)?;
     if options.dry_run {
         let mut text = planned_text(&job, &plan);
@@ -103,8 +101,36 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output:
     if let Some(it) = &goes_on {
         output.note(&format!("axis {}: {}", job.axis, it.text(&job)));
     }
-    let is_alone = options.yes || !job.needs_operator();
-    let terminal = Terminal::new(is_alone, args.hand(), output)?;
+    let asked = Asked {
+        job: &job,
+        goes_on: goes_on.as_ref().map(|it| it.journal.as_path()),
+        is_alone: options.yes || !job.needs_operator(),
+    };
+    or_by_its_service(done(args, &asked, output), |service| {
+        let request = json!({
+            "axis": job.axis,
+            "job": text,
+            "beyond": options.beyond,
+            "resume": asked.goes_on.and_then(|it| it.file_stem()).map(|it| it.to_string_lossy()),
+        });
+        let by = (asked.is_alone, args.hand());
+        service.do_job(args, (&job.axis, request), by, output)
+    })
+}
+
+/// A job that is to be done.
+struct Asked<'a> {
+    job: &'a Job,
+    /// The journal that it goes on with.
+    goes_on: Option<&'a Path>,
+    /// Whether nobody is waited for.
+    is_alone: bool,
+}
+
+/// Does the job here.
+fn done(args: &MachineArgs, asked: &Asked<'_>, output: Output) -> Ended {
+    let (job, journal) = (asked.job, asked.goes_on);
+    let terminal = Terminal::new(asked.is_alone, args.hand(), output)?;
     let mut beside = Beside { terminal, output };
     let mut session = Session::open(args, VERB, Use::Motion, output)?;
     let store = session.store.clone();
@@ -113,18 +139,27 @@ pub(crate) fn run(args: &MachineArgs, file: &Path, options: &JobOptions, output:
         machine.linear(&job.axis)?.load_active(&store)?;
         machine.linear(&job.axis)?.zero(&store)?;
         let mut stage = machine.linear(&job.axis)?;
-        let journal = goes_on.as_ref().map(|it| it.journal.as_path());
         let done = resumable(&store, VERB, &job.axis, journal, || match journal {
-            None => stage.run_job(&store, &job, &mut beside),
-            Some(journal) => stage.resume_job(&store, &job, journal, &mut beside),
+            None => stage.run_job(&store, job, &mut beside),
+            Some(journal) => stage.resume_job(&store, job, journal, &mut beside),
         })?;
         machine.shut_down()?;
         Ok((done, to_json::counters(&machine.devices().counters())))
     })?;
-    let mut value = done_value(&job, &done);
+    let mut value = done_value(job, &done);
     value["counters"] = counters;
-    output.result(&done_text(&job, &done), &value)
+    output.result(&done_text(job, &done), &value)
 }
+
+/// What a person is asked by a job that a service does.
+pub(crate) static GO_ON_ASKED: AskedOf = AskedOf {
+    what: GO_ON,
+    ask: |terminal, text, task| {
+        // It says itself what else is in the text.
+        terminal.ask_to_go_on(&plain(task["text"].as_str().unwrap_or(text)))
+    },
+    answer: entered,
+};
 
 /// The operator, who also sees each point as it is reached.
 struct Beside {
@@ -215,7 +250,7 @@ fn planned_value(job: &Job, plan: &JobPlan) -> Value {
     })
 }
 
-fn done_text(job: &Job, done: &JobDone) -> String {
+pub(crate) fn done_text(job: &Job, done: &JobDone) -> String {
     let stated = done.reached.iter().filter_map(|it| it.moved.uncertainty);
     let most =
         stated.clone().reduce(
@@ -247,7 +282,7 @@ fn done_text(job: &Job, done: &JobDone) -> String {
     text + &format!("\n  each point in {}", done.journal.display())
 }
 
-fn done_value(job: &Job, done: &JobDone) -> Value {
+pub(crate) fn done_value(job: &Job, done: &JobDone) -> Value {
     let point = |it: &Reached| {
         let mut value = moved::value(&job.axis, &it.moved, Some(&done.calibration));
         value["repetition"] = json!(it.repetition);

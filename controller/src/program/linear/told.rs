@@ -6,7 +6,7 @@ use units::{Metres, Short};
 use crate::linear::{
     Calibrated, HallSweepEntry, HeldEntry, LinearTeller, Moved, Verified, ZeroEntry, Zeroed,
 };
-use crate::program::linear::{moved as of_move, uncertainty};
+use crate::program::linear::{job, moved as of_move, uncertainty};
 use crate::program::{json as to_json, text};
 use crate::runs::Told;
 
@@ -16,6 +16,10 @@ pub(crate) static TELLER: LinearTeller = LinearTeller {
     calibrated,
     verified,
     moved,
+    job_done: |job, done| Told {
+        text: job::done_text(job, done),
+        value: job::done_value(job, done),
+    },
 };
 
 pub(crate) fn zeroed(axis: &str, zeroed: &Zeroed) -> Told {

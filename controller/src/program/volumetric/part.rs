@@ -15,6 +15,7 @@ use crate::program::MachineArgs;
 use crate::program::data_file::volume_head_of;
 use crate::program::data_text::{name_of, read};
 use crate::program::intended::nowhere;
+use crate::program::kept::or_by_its_service;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::memory_args::{ImportArgs, MemoryArgs};
@@ -28,11 +29,12 @@ use crate::volumetric::{Mover, Remembered, import, memory_pointer};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
-/// What drives a path, and what is recorded meanwhile.
-struct Ready {
-    /// `None`: nothing is known to correct.
-    mover: Option<Mover>,
-    part: Option<FirstPart>,
+/// What drives a path.
+enum Ready {
+    /// Nothing is known to correct, or it is not to be.
+    Alone,
+    Corrected(Mover),
+    First(Mover, FirstPart),
 }
 
 pub(crate) fn run(
@@ -42,49 +44,60 @@ pub(crate) fn run(
     (is_first, uncompensated): (bool, bool),
     output: Output,
 ) -> Ended {
-    let path = read(file)?;
+    let rows = read(file)?;
+    let how = (is_first, uncompensated);
+    let here = followed_here(args, (file, &rows), join, how, output);
+    or_by_its_service(here, |service| {
+        // What cannot be followed is said with the names of here.
+        let path = judged(args, (file, &rows), join, !uncompensated)?;
+        output.note(&before_it_moves(file, &path));
+        let kind = if is_first { "first_part" } else { "path" };
+        let rows = join.map_or(rows.clone(), |it| it.said_above(&rows));
+        let request = json!({"kind": kind, "path": rows, "uncompensated": uncompensated});
+        service.follow(args, request, output)
+    })
+}
+
+fn followed_here(
+    args: &MachineArgs,
+    (file, rows): (&Path, &str),
+    join: Option<Join>,
+    (is_first, uncompensated): (bool, bool),
+    output: Output,
+) -> Ended {
     let mut session = Session::open(args, "run", Use::Motion, output)?;
     if !uncompensated {
         require_measured(&session.store)?;
     }
     // Long paths take seconds to judge: before the drives wait for our heartbeat.
     let judge = session.machine.volumetric()?.path_judge()?;
-    let mut path = judge.judge((file, &path), join, !uncompensated)?;
+    let mut path = judge.judge((file, rows), join, !uncompensated)?;
     output.note(&before_it_moves(file, &path));
     let points = core::mem::take(&mut path.points);
     let ready = |machine: &mut Machine, store: &Store| {
+        let mut volume = machine.volumetric()?;
         if is_first {
-            let (mover, part) = machine.volumetric()?.first_part(store)?;
-            let (mover, part) = (Some(mover), Some(part));
-            return Ok(Ready { mover, part });
+            let (mover, part) = volume.first_part(store)?;
+            return Ok(Ready::First(mover, part));
         }
         let mover = match uncompensated {
             true => None,
-            false => machine.volumetric()?.stored_mover(store)?,
+            false => volume.stored_mover(store)?,
         };
-        Ok(Ready { mover, part: None })
+        Ok(mover.map_or(Ready::Alone, Ready::Corrected))
     };
     let follow =
         |machine: &mut Machine, store: &Store, ready| follow_part(machine, store, ready, points);
     let ((along, kept), counters) = zeroed_volume(session, ready, follow)?;
-    let Told {
-        mut text,
-        mut value,
-    } = followed(&along, &path);
-    if let Some(kept) = &kept {
-        text += &format!(
-            "\nthe errors that the detectors saw were not corrected in this part; {} keeps them: \
-             all later parts are made with them\n{}",
-            short(&kept.id),
-            kept_text(kept)
-        );
-        value["memory"] = kept_value(kept);
-    }
-    output.told(Told { text, value }, counters)
+    output.told(followed(&along, &path, kept.as_ref()), counters)
 }
 
-/// What came of a path.
-pub(super) fn followed(followed: &PathFollowed, path: &CsvPath) -> Told {
+/// What came of a path; `kept` is what later parts are made with, when it was the first.
+pub(super) fn followed(
+    followed: &PathFollowed,
+    path: &CsvPath,
+    kept: Option<&Remembered>,
+) -> Told {
     let said = match &followed.corrected {
         Some(corrected) => corrected_text(corrected),
         None => "NOT CORRECTED: by the encoders alone".into(),
@@ -97,10 +110,32 @@ pub(super) fn followed(followed: &PathFollowed, path: &CsvPath) -> Told {
     if let Some(corrected) = &followed.corrected {
         write_corrected(corrected, &mut value);
     }
-    Told {
-        text: format!("{count} points followed, {said}\n{timing}"),
-        value,
+    let mut text = format!("{count} points followed, {said}\n{timing}");
+    if let Some(kept) = kept {
+        text += &format!(
+            "\nthe errors that the detectors saw were not corrected in this part; {} keeps them: \
+             all later parts are made with them\n{}",
+            short(&kept.id),
+            kept_text(kept)
+        );
+        value["memory"] = kept_value(kept);
     }
+    Told { text, value }
+}
+
+/// The path in `rows`, judged without a machine.
+fn judged(
+    args: &MachineArgs,
+    (file, rows): (&Path, &str),
+    join: Option<Join>,
+    is_corrected: bool,
+) -> Result<CsvPath, Failure> {
+    let loaded = config::load(&args.config)?;
+    if is_corrected {
+        require_measured(&loaded.config.machine.store())?;
+    }
+    let judge = nowhere::machine(&loaded).volumetric()?.path_judge()?;
+    judge.judge((file, rows), join, is_corrected)
 }
 
 /// Says what would be driven; nothing is connected.
@@ -111,14 +146,8 @@ pub(crate) fn only_judged(
     is_corrected: bool,
     output: Output,
 ) -> Ended {
-    let text = read(file)?;
-    let loaded = config::load(&args.config)?;
-    let store = loaded.config.machine.store();
-    if is_corrected {
-        require_measured(&store)?;
-    }
-    let judge = nowhere::machine(&loaded).volumetric()?.path_judge()?;
-    let path = judge.judge((file, &text), join, is_corrected)?;
+    let rows = read(file)?;
+    let path = judged(args, (file, &rows), join, is_corrected)?;
     let value = json!({"dry_run": true, "points": path.points.len(), "join": path.join.to_string(),
                        "longer_s": path.longer.as_secs_f64(),
                        "largest_departure": departure_value(&path.departure)});
@@ -161,25 +190,25 @@ fn departure_value(departure: &Departure) -> Value {
 fn follow_part(
     machine: &mut Machine,
     store: &Store,
-    Ready { mover, part }: Ready,
+    ready: Ready,
     points: Vec<Vec<Metres>>,
 ) -> Result<(PathFollowed, Option<Remembered>), Failure> {
     let mut volume = machine.volumetric()?;
-    let is_corrected = mover.is_some();
-    let mut mover = match mover {
-        Some(mover) => mover,
-        None => volume.uncorrected_mover()?,
-    };
-    let followed = volume.follow(&mut mover, points, is_corrected, || {
-        if let Some(part) = &part {
-            part.recorder.listen();
+    match ready {
+        Ready::First(mover, part) => {
+            let (followed, kept) = volume.follow_part(store, (mover, part), points)?;
+            Ok((followed, Some(kept)))
         }
-    })?;
-    let kept = match part {
-        Some(part) => Some(volume.keep_part(store, mover, part)?),
-        None => None,
-    };
-    Ok((followed, kept))
+        Ready::Corrected(mut mover) => {
+            let followed = volume.follow(&mut mover, points, true, || {})?;
+            Ok((followed, None))
+        }
+        Ready::Alone => {
+            let mut mover = volume.uncorrected_mover()?;
+            let followed = volume.follow(&mut mover, points, false, || {})?;
+            Ok((followed, None))
+        }
+    }
 }
 
 fn corrected_text(path: &CorrectedPath) -> String {

@@ -45,11 +45,11 @@ pub(super) async fn plan(
     let judging = {
         let (desk, request) = (state.desk.clone(), request.clone());
         // Long paths take seconds: others are served meanwhile.
-        tokio::task::spawn_blocking(move || desk.judge_path(&request))
+        tokio::task::spawn_blocking(move || desk.judge_run(&request))
     };
-    let path = judging.await;
-    let path = path.map_err(|it| Problem::new(Code::Busy, it.to_string(), ""))??;
-    let order = Desk::plan_order(&id, &request, path);
+    let judged = judging.await;
+    let judged = judged.map_err(|it| Problem::new(Code::Busy, it.to_string(), ""))??;
+    let order = Desk::plan_order(&id, &request, judged);
     obey(&state.desk, &caller, order).await?;
     let location = [(header::LOCATION, format!("/v1/runs/{id}"))];
     Ok((StatusCode::CREATED, location, Json(state.desk.run(&id)?)))

@@ -98,7 +98,7 @@ impl Keeper {
             group,
             is_resumed: true,
             resume: Some(found.journal.clone()),
-            path: None,
+            judged: None,
         };
         self.runs.keep(Run::new(task, axes, view));
     }

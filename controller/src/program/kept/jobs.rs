@@ -1,0 +1,65 @@
+//! Jobs and paths of a machine that a service keeps.
+
+use std::path::Path;
+
+use machine::Stage;
+use serde_json::{Value, json};
+
+use super::{Service, Waiting, refuse, stop_request, tell};
+use crate::Failure;
+use crate::program::MachineArgs;
+use crate::program::exchange::{ask, plain};
+use crate::program::linear::job::GO_ON_ASKED;
+use crate::program::output::{Ended, Output};
+
+impl Service {
+    /// Does the job that `request` has on the axis; `by` is whether nobody is waited for, and the hand of an emulated
+    /// machine.
+    pub(crate) fn do_job(
+        &self,
+        args: &MachineArgs,
+        (axis, mut request): (&str, Value),
+        by: (bool, Option<&Path>),
+        output: Output,
+    ) -> Ended {
+        refuse(args.record.is_some(), "--record")?;
+        let stop = stop_request()?;
+        self.zero_first(Some(axis), &stop, output)?;
+        self.give_up_paused(&request)?;
+        request["kind"] = json!("job");
+        let waiting = Waiting {
+            by,
+            asked: vec![&GO_ON_ASKED],
+            ..Waiting::of_nobody(&stop, output)
+        };
+        let run = self.run(Stage::Job, request, None, waiting)?;
+        tell(&run, output)
+    }
+
+    /// What is gone on with anew is not gone on with twice.
+    fn give_up_paused(&self, request: &Value) -> Result<(), Failure> {
+        let Some(journal) = request["resume"].as_str() else {
+            return Ok(());
+        };
+        let runs = ask(&self.at, "GET", "/v1/runs", "")?;
+        for run in runs.as_array().into_iter().flatten() {
+            let left = run["journal"].as_str().map(Path::new);
+            let is_meant = left.is_some_and(|it| it.file_stem() == Some(journal.as_ref()));
+            if is_meant && run["state"] == "paused" {
+                let id = plain(run["id"].as_str().unwrap_or_default());
+                ask(&self.at, "POST", &format!("/v1/runs/{id}/abort"), "{}")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Follows the path that `request` has.
+    pub(crate) fn follow(&self, args: &MachineArgs, request: Value, output: Output) -> Ended {
+        refuse(args.record.is_some(), "--record")?;
+        let stop = stop_request()?;
+        self.zero_first(None, &stop, output)?;
+        let waiting = Waiting::of_nobody(&stop, output);
+        let run = self.run(Stage::Job, request, None, waiting)?;
+        tell(&run, output)
+    }
+}
