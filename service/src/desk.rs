@@ -393,7 +393,7 @@ impl Desk {
         let order = Self::lease_order(request)?;
         match self.give(caller, order)?.wait()? {
             Answer::Leased(leased) => Ok(leased),
-            Answer::Done | Answer::Named(_) => Err(ended()),
+            Answer::Done | Answer::Named(_) | Answer::Chosen(..) => Err(ended()),
         }
     }
 
@@ -457,6 +457,6 @@ impl Desk {
 pub(crate) fn named(answer: Answer) -> Result<String, Problem> {
     match answer {
         Answer::Named(name) => Ok(name),
-        Answer::Done | Answer::Leased(_) => Err(ended()),
+        Answer::Done | Answer::Leased(_) | Answer::Chosen(..) => Err(ended()),
     }
 }

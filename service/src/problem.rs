@@ -1,5 +1,6 @@
 //! Why an order was not carried out: a problem in the form of RFC 9457, with the same text as the command line.
 
+use drivers::device::DeviceError;
 use serde::{Deserialize, Serialize};
 use truestage::Failure;
 use utoipa::ToSchema;
@@ -339,7 +340,11 @@ fn code_of_machine(failure: &machine::Failure) -> Code {
         Of::NotStarted { .. } => Code::ErrorStop,
         Of::NoSuchAxis { .. } => Code::NoSuchAxis,
         Of::NoSuchDevice { .. } => Code::Configuration,
-        Of::Overdue { .. } => Code::Overdue,
+        Of::Overdue { .. }
+        | Of::Device {
+            source: DeviceError::Timeout { .. },
+            ..
+        } => Code::Overdue,
         Of::Interrupted | Of::Terminated { .. } => Code::Stopped,
         Of::HeldUp { failure, .. }
         | Of::Babbling {

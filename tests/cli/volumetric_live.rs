@@ -266,7 +266,10 @@ fn kept(live: &Live, geometry: &Value) {
     let id = text(geometry);
     let chosen = live.run_nowhere(&["cal", "activate", "machine.toml", &id[..12]]);
     let chosen = chosen.with_code(0);
-    assert_eq!((&chosen["axis"], &chosen["active"]), (&"volume".into(), geometry));
+    assert_eq!(
+        (&chosen["axis"], &chosen["active"]),
+        (&"volume".into(), geometry)
+    );
     let never = live.run_nowhere(&["cal", "rollback", "machine.toml", "--axis", "volume"]);
     check_error(&never.with_code(2), &["volume", "earlier"]);
     let words = ["calibrate", "machine.toml", "--yes", "--warm-up-min=-1"];

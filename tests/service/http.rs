@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use service::{
-    Access, AnswerRequest, AxisView, CalibrationView, Caller, Edge, Event, JogRequest,
+    Access, AnswerRequest, AxisView, CalibrationView, Caller, ChosenView, Edge, Event, JogRequest,
     LeaseRequest, Leased, Listen, MachineView, MotionView, MoveRequest, Problem, RunRequest,
     RunView, StopMode,
 };

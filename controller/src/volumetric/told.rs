@@ -3,10 +3,10 @@
 use machine::engine::{CsvPath, Live};
 
 use crate::runs::Told;
-use crate::volumetric::{Remembered, VolumetricCalibrated};
 use crate::volumetric::path::PathFollowed;
 use crate::volumetric::reference::VolumetricReferenced;
 use crate::volumetric::verify::VolumetricVerified;
+use crate::volumetric::{Remembered, VolumetricCalibrated};
 
 /// Who says it ([`Teller::of`](crate::runs::Teller::of)).
 #[derive(Clone, Copy, Debug)]

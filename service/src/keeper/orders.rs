@@ -179,8 +179,8 @@ impl Keeper {
 
     /// Refuses axes of which somebody has one.
     pub(crate) fn require_all_free(&self, group: &Group) -> Result<(), Problem> {
-        let axes = group.axes.iter();
-        axes.map(|it| self.require_free(self.place(it)?)).collect()
+        let mut axes = group.axes.iter();
+        axes.try_for_each(|it| self.require_free(self.place(it)?))
     }
 
     /// The axes of `group` are corrected otherwise from now on.

@@ -129,10 +129,7 @@ fn the_screws_of_a_platform_go_back_together_and_one_by_one_without_a_move() {
             .map(|(it, id)| (*it, Some(id.as_str()), true));
         assert_eq!(changed(&back), expected.collect::<Vec<_>>());
         assert_eq!(back.axes.len(), 3);
-        assert_eq!(
-            SCREWS.map(|it| bed.in_use_of(it)),
-            first.clone().map(Some)
-        );
+        assert_eq!(SCREWS.map(|it| bed.in_use_of(it)), first.clone().map(Some));
         let one = bed.without_a_move(SCREWS, || bed.client.activate(&anna(), &second[1][..10]));
         assert_eq!(
             changed(&one.unwrap()),

@@ -49,9 +49,9 @@ fn a_job_is_judged_planned_and_done_with_whoever_is_waited_for() {
         let planned = bed.client.run(&id, Duration::ZERO).unwrap();
         assert_eq!((planned.plan.points, planned.of.as_str()), (4, "x"));
         assert_eq!(planned.plan.asks, ["lay a part on the stage"]);
+        assert!(planned.plan.seconds_at_least >= 0.4, "{:?}", planned.plan);
         let travel = planned.plan.travel.expect("it is known").value;
         assert!((travel - 22.5).abs() < 0.1, "{travel} mm");
-        assert!(planned.plan.seconds_at_least >= 0.4, "{:?}", planned.plan);
         bed.client.start(&anna(), &id).unwrap();
 
         let first = bed.asked(&id);

@@ -8,7 +8,7 @@ use tests::volume::quick;
 use tests::{Edit, Rig, UVW, VOLUMETRIC};
 use units::Metres;
 
-use super::{Bed, SEED, anna, bert, compensated, each, to, zeroed};
+use super::{Bed, SEED, anna, bert, compensated, each, each_here, to, zeroed};
 use crate::client::{InProcess, PATIENCE};
 use crate::stage::Stage;
 
@@ -211,7 +211,8 @@ fn line_of(task: &serde_json::Value) -> LineSetUp {
 
 #[test]
 fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
-    with_volume(|bed| {
+    let new = |rig, folder: &Path| Stage::new(rig, (VOLUMETRIC, SEED), folder, short_line);
+    let body = |bed: &Bed<'_>| {
         let request = |kind: RunKind, warm_up_min: Option<f64>| RunRequest {
             warm_up_min,
             start: false,
@@ -220,7 +221,10 @@ fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
         let planned = |warm_up_min| {
             let request = request(RunKind::Calibrate, warm_up_min);
             let id = bed.client.plan(&anna(), &request).unwrap();
-            bed.client.run(&id, core::time::Duration::ZERO).unwrap().plan
+            bed.client
+                .run(&id, core::time::Duration::ZERO)
+                .unwrap()
+                .plan
         };
         let (cold, warm) = (planned(None), planned(Some(2.5)));
         assert!(warm.asks.len() > cold.asks.len(), "{warm:?}");
@@ -249,7 +253,8 @@ fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
         let journal = run.journal.expect("it was begun");
         let journal = std::fs::read_to_string(journal).expect("it can be read");
         assert!(journal.contains("\"warm\":true"), "{journal}");
-    });
+    };
+    each_here(new, zeroed(body));
 }
 
 /// Once, and by the library alone.

@@ -140,13 +140,20 @@ fn a_stop_by_anybody_ends_a_run_at_once_and_names_who() {
     }
 }
 
+/// A drive that lets its axis be held fast: what it cannot do is seen by its time only.
+fn lenient(text: String) -> String {
+    text.edit(
+        "following_error_limit_um = 500.0",
+        "following_error_limit_um = 100000.0",
+    )
+}
+
 /// The fourth end: a step that takes longer than it may.
 #[test]
-fn a_run_whose_axis_does_not_come_to_rest_is_stopped_and_timed_out() {
-    let new = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, short);
+fn a_run_whose_axis_does_not_arrive_in_time_is_stopped_and_timed_out() {
+    let new = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, lenient);
     let body = |bed: &Bed<'_>| {
-        let shaking = Fault::Vibration { amplitude_um: 5.0 };
-        bed.stage.inject(shaking);
+        bed.stage.inject(Fault::BlockedAxis { axis: 0 });
         let id = bed.run_of(RunKind::Calibrate);
         let run = bed.client.run(&id, PATIENCE).unwrap();
         assert_eq!(run.state, RunState::TimedOut, "{run:?}");

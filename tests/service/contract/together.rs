@@ -266,12 +266,16 @@ fn a_platform_that_is_stopped_under_way_stands_and_says_who_did_it() {
 /// Line 1, the fourth end: what its procedure waits for longer than it may.
 #[test]
 fn a_pose_that_takes_too_long_has_timed_out_and_what_is_queued_has_failed() {
-    let hasty = |text: String| {
-        text.replace("speed_mm_per_s = 10.0  ", "speed_mm_per_s = 0.5  ")
-            .replace("move_timeout_s = 10.0", "move_timeout_s = 2.0")
+    // What an axis that is held fast cannot do is seen by its time only.
+    let lenient = |text: String| {
+        text.edit(
+            "following_error_limit_um = 200.0",
+            "following_error_limit_um = 50000.0",
+        )
     };
-    let new = move |rig, folder: &Path| Stage::new(rig, (UVW, SEED), folder, hasty);
+    let new = |rig, folder: &Path| Stage::new(rig, (UVW, SEED), folder, lenient);
     let body = |bed: &Bed<'_>| {
+        bed.stage.inject(Fault::BlockedAxis { axis: 2 });
         let id = bed.begin(&pose(1.4, 1.4, 0.0));
         let queued = bed.begin(&MoveRequest {
             if_moving: IfMoving::Queue,

@@ -9,7 +9,7 @@ use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
 use crate::linear::job::kept::goes_on_at;
 use crate::linear::job::{GoOn, Job, JobPlan};
-use crate::runs::{AskedJob, JobJudge, JudgedJob, Planned, Travel};
+use crate::runs::{JobJudge, JudgedJob, Planned, Travel};
 
 /// So many points a job may come to where somebody else waits for what it gives: each is in that.
 const STOPS_MAX: u64 = 2000;
@@ -37,7 +37,9 @@ fn require_short(job: &Job) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage {
-        what: format!("the job goes to {stops} points, repetitions counted, and a service does {STOPS_MAX}"),
+        what: format!(
+            "the job goes to {stops} points, repetitions counted, and a service does {STOPS_MAX}"
+        ),
         help: "divide it, or end the service and use `truestage run`".into(),
     })
 }
@@ -69,7 +71,11 @@ fn planned(job: &Job, plan: &JobPlan, speed: MetresPerSecond) -> Planned {
     let times = f64::from(job.repetitions);
     let travel = Metres(once * times + back * (times - 1.0));
     let moves = Duration::try_from_secs_f64(travel.value() / speed.value()).unwrap_or_default();
-    let stands: Duration = job.points.iter().map(|it| job.settle + waits(&it.go_on)).sum();
+    let stands: Duration = job
+        .points
+        .iter()
+        .map(|it| job.settle + waits(&it.go_on))
+        .sum();
     let mut asks = Vec::new();
     for point in &job.points {
         if let GoOn::Operator(text) = &point.go_on

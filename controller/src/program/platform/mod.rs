@@ -51,3 +51,6 @@ fn html(path: &Path) -> Result<String, Failure> {
     let page = PlatformPage::of(&journal, made_from::<ScrewContent>(path)?);
     Ok(report::render(&page))
 }
+
+/// What `--axis` calls all screws of a platform.
+const PLATFORM: &str = "platform";

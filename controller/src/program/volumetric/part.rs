@@ -75,7 +75,7 @@ fn followed_here(
     output.note(&before_it_moves(file, &path));
     let points = core::mem::take(&mut path.points);
     let ready = |machine: &mut Machine, store: &Store| {
-        let mut volume = machine.volumetric()?;
+        let volume = machine.volumetric()?;
         if is_first {
             let (mover, part) = volume.first_part(store)?;
             return Ok(Ready::First(mover, part));

@@ -1,6 +1,5 @@
 //! The verbs of the cycle on three axes that are corrected throughout their volume (system S4).
 
-use core::time::Duration;
 use std::path::PathBuf;
 
 use compensator::volumetric::identify::{Identified, scatter_limit};

@@ -181,7 +181,9 @@ pub(super) async fn lease(
     let order = Desk::lease_order(&request)?;
     match obey(&state.desk, &caller, order).await? {
         Answer::Leased(leased) => Ok(Json(leased)),
-        Answer::Done | Answer::Named(_) => Err(Problem::new(Code::Ending, "the service ends", "")),
+        Answer::Done | Answer::Named(_) | Answer::Chosen(..) => {
+            Err(Problem::new(Code::Ending, "the service ends", ""))
+        }
     }
 }
 
