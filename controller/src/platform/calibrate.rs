@@ -197,7 +197,7 @@ impl AlignmentPlatform<'_> {
         let of_all = seen.covariance.as_ref();
         let u = of_all.map(|it| kinematics.u_strokes(pose, it)[at]);
         let axis = self.state.screws[at].axis.clone();
-        journal.write(&PlatformEntry::Stroke(StrokeEntry {
+        let entry = StrokeEntry {
             axis,
             run,
             approach: approach.symbol(),
@@ -206,12 +206,9 @@ impl AlignmentPlatform<'_> {
             measured_u_m: u.map(Metres::value),
             pose: pose.into(),
             at_s: self.core.now().seconds(),
-        }))?;
-        let seen = Stroke {
-            approach,
-            stroke,
-            deviation: measured - stroke,
         };
+        let seen = entry.stroke();
+        journal.write(&PlatformEntry::Stroke(entry))?;
         Ok((seen, u))
     }
 

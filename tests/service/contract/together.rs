@@ -6,7 +6,7 @@ use std::path::Path;
 use mock_bus::fault::Fault;
 use service::{
     AxisState, Code, Coordinate, Event, IfMoving, MachineState, MotionState, MotionView,
-    MoveRequest, RunKind, RunRequest, RunState, StopMode,
+    MoveRequest, RunKind, RunPlanView, RunRequest, RunState, StopMode,
 };
 use tests::volume::{Volume, good, quick};
 use tests::{Edit, UVW, VOLUMETRIC};
@@ -420,7 +420,9 @@ pub(super) fn path(rows: &str) -> RunRequest {
 }
 
 /// The same rows with straight lines, as the text says: the corner is passed within what that allows.
-fn has_straight_lines(bed: &Bed<'_>, corner: &RunRequest) {
+fn has_straight_lines_too(bed: &Bed<'_>, corner: &RunRequest, planned: &RunPlanView) {
+    assert_eq!(planned.join.as_deref(), Some("spline"));
+    assert_eq!(planned.seconds_at_least, 2.0);
     let rows = corner.path.as_ref().expect("it has rows");
     let straight = RunRequest {
         path: Some(format!("# join: linear 100um\n{rows}")),
@@ -473,9 +475,7 @@ fn follows_paths(bed: &Bed<'_>) {
         (planned.state, planned.plan.points),
         (RunState::Planned, 1001)
     );
-    assert_eq!(planned.plan.seconds_at_least, 2.0);
-    assert_eq!(planned.plan.join.as_deref(), Some("spline"));
-    has_straight_lines(bed, &corner);
+    has_straight_lines_too(bed, &corner, &planned.plan);
     let travel = planned.plan.travel.expect("it is known").value;
     assert!((8.0..9.0).contains(&travel), "{travel} mm");
     let departure = planned.plan.departure.expect("it turns a corner");

@@ -218,22 +218,18 @@ proptest! {
         let path = path(&rows, Metres::from_um(blend_um));
         let told = path.departure.size.um();
         prop_assert!(told <= blend_um * (1.0 + 1e-9), "{} of {}", told, blend_um);
-        let [off, missed] = distances(&path, &rows).map(|it| it * 1e3);
-        // The path is seen once in a period: it is no farther from a row than halfway to the next point.
+        let [off, _] = distances(&path, &rows).map(|it| it * 1e3);
         prop_assert!(off <= told + 1e-6, "{} beside the lines, told {}", off, told);
-        prop_assert!(missed <= told + 15.0, "{} from a row, told {}", missed, told);
         let points = &path.points;
         let ends = [(0, 0), (points.len() - 1, rows.len() - 1)];
         for (point, row) in ends {
             let apart = minus(mm(&points[point]), rows[row].0);
             prop_assert!(length(apart) < 1e-9, "{:?}", apart);
         }
-        if path.tight.is_empty() {
+        if judged(&path).is_ok() {
             // 1 m/s² of each axis.
-            let most = f64::sqrt(3.0) * 1.01;
-            let step = largest_step(&path);
-            let is_crowded = judged(&path).is_err();
-            prop_assert!(step <= most || is_crowded, "{} mm/s in a period", step);
+            let (step, most) = (largest_step(&path), f64::sqrt(3.0) * 1.01);
+            prop_assert!(step <= most, "{} mm/s in a period", step);
         }
     }
 
@@ -249,6 +245,10 @@ proptest! {
         prop_assert_eq!(&path.tight, &[]);
         let refused = judged(&path);
         prop_assert!(refused.is_ok(), "{:?}", refused);
+        // Between two points lie straight lines here: 2 m/s² leave them by 0.25 µm within a period.
+        let told = path.departure.size.um() + 0.5;
+        let [off, missed] = distances(&path, &rows).map(|it| it * 1e3);
+        prop_assert!(off <= told && missed <= told, "{} and {} of {}", off, missed, told);
         let own = path.departure.size * (1.0 + 1e-9) + Metres::from_um(0.001);
         let again = super::tests::path(&rows, own);
         prop_assert_eq!(&again.tight, &[]);
