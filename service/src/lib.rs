@@ -37,12 +37,12 @@ pub use manager::Manager;
 pub use problem::{Code, Problem, ProblemBody};
 pub use quantity::{Quantity, Speed};
 pub use request::{
-    AnswerRequest, Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, RunKind, RunRequest,
-    StopMode, Target, WayName,
+    AnswerRequest, Caller, IfMoving, JogRequest, LeaseRequest, MoveRequest, PathRows, PathTable,
+    RunKind, RunRequest, StopMode, Target, WayName,
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{
     AxisState, AxisView, CalibrationView, Cause, ChangeView, ChosenView, DepartureView, Event,
-    GroupView, JournalView, LeaseView, Leased, LegView, MachineState, MachineView, MotionState, MotionView, QuestionView,
-    RunPlanView, RunState, RunView, Stopped, ToldView,
+    GroupView, JournalView, LeaseView, Leased, LegView, MachineState, MachineView, MotionState,
+    MotionView, QuestionView, RunPlanView, RunState, RunView, Stopped, ToldView,
 };

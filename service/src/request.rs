@@ -8,7 +8,10 @@ use truestage::rotary::Way;
 use truestage::runs::Group;
 use utoipa::ToSchema;
 
+mod rows;
 mod whole;
+
+pub use rows::{PathRows, PathTable};
 
 use crate::coordinate::Coordinate;
 use crate::quantity::{Speed, SpeedIn, TravelSpeedIn};
@@ -242,12 +245,11 @@ pub struct RunRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0, exclusive_maximum = 100000)]
     pub warm_up_min: Option<f64>,
-    /// Path: its rows as a CSV file has them, a heading and a row for each moment: `time_s,x_mm,y_mm,z_mm`. A line
-    /// `# join: linear 50um` above the heading joins them by straight lines whose corners are passed within that
-    /// length; without it runs a cubic spline, at rest at both ends. At most 600 s.
+    /// Path: its rows, as a CSV file has them or as a table: a heading `time_s,x_mm,y_mm,z_mm`, and a row for each
+    /// moment. A line `# join: linear 50um` above the heading (`join` of a table) joins them by straight lines whose
+    /// corners are passed within that length; without it runs a cubic spline, at rest at both ends. At most 600 s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(max_length = 1000000)]
-    pub path: Option<String>,
+    pub path: Option<PathRows>,
     /// Job: what `truestage run JOB.toml` takes, as a text. At most 2000 points, repetitions counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 1000000)]

@@ -33,7 +33,9 @@ impl Desk {
     pub(crate) fn judge_run(&self, request: &RunRequest) -> Result<Option<Judged>, Problem> {
         refuse_what_is_of_others(request)?;
         match request.kind {
-            RunKind::Path | RunKind::FirstPart => self.judge_path(request).map(Judged::Path).map(Some),
+            RunKind::Path | RunKind::FirstPart => {
+                self.judge_path(request).map(Judged::Path).map(Some)
+            }
             RunKind::Job => self.judge_job(request).map(Some),
             RunKind::Zero | RunKind::Calibrate | RunKind::Verify | RunKind::Reference => Ok(None),
         }
@@ -47,9 +49,14 @@ impl Desk {
         })?;
         if request.kind == RunKind::FirstPart && request.uncompensated {
             let what = "a first part records what the correction leaves";
-            return Err(Problem::new(Code::Refused, what, "leave `uncompensated` out"));
+            return Err(Problem::new(
+                Code::Refused,
+                what,
+                "leave `uncompensated` out",
+            ));
         }
-        require_short(rows)?;
+        let rows = rows.csv()?;
+        require_short(&rows)?;
         let mut judges = self.shared.judges.paths.iter();
         let named = |name: &str| request.axis.as_deref().is_none_or(|it| it == name);
         let (_, judge) = judges.find(|it| named(&it.0)).ok_or_else(|| {
@@ -57,7 +64,7 @@ impl Desk {
             Problem::new(Code::NotOffered, what, "three axes of a volume do")
         })?;
         let judge = judge.lock().unwrap_or_else(PoisonError::into_inner);
-        let judged = judge.judge(&self.shared.store, rows, !request.uncompensated);
+        let judged = judge.judge(&self.shared.store, &rows, !request.uncompensated);
         judged.map_err(refused)
     }
 
@@ -69,7 +76,11 @@ impl Desk {
         })?;
         let judge = self.shared.judges.jobs.as_ref().ok_or_else(|| {
             let what = "nothing of this machine does jobs";
-            Problem::new(Code::NotOffered, what, "axes that are moved by themselves do")
+            Problem::new(
+                Code::NotOffered,
+                what,
+                "axes that are moved by themselves do",
+            )
         })?;
         let resume = request.resume.as_deref().map(|it| self.journal_path(it));
         let resume = resume.transpose()?;

@@ -56,7 +56,10 @@ fn a_job_is_judged_planned_and_done_with_whoever_is_waited_for() {
 
         let first = bed.asked(&id);
         assert_eq!((first.number, first.what.as_str()), (1, "go_on"));
-        assert!(first.text.contains("load: lay a part on the stage"), "{first:?}");
+        assert!(
+            first.text.contains("load: lay a part on the stage"),
+            "{first:?}"
+        );
         // It holds its place under power, and nobody else moves it.
         let stands = bed.encoder_mm("x");
         assert!((stands - 5.0).abs() < 0.05, "{stands}");
@@ -108,7 +111,7 @@ fn is_judged(bed: &Bed<'_>) {
     };
     bed.refuses_job(&never, Code::NotFound, &["no journal"]);
     let path = RunRequest {
-        path: Some("time_s,x_mm\n0,0\n1,1\n".to_owned()),
+        path: Some("time_s,x_mm\n0,0\n1,1\n".to_owned().into()),
         ..RunRequest::of(RunKind::Path, None)
     };
     bed.refuses_job(&path, Code::NotOffered, &["follows paths"]);
@@ -152,6 +155,9 @@ fn a_job_that_is_paused_goes_on_at_the_point_that_was_not_left_and_as_the_same_j
         bed.answer(&id, 1, "done").unwrap();
         let run = bed.client.run(&id, PATIENCE).unwrap();
         assert_eq!(run.state, RunState::Done, "{run:?}");
-        assert_eq!((&run.result["points_before"], &run.result["points"]), (&2.into(), &2.into()));
+        assert_eq!(
+            (&run.result["points_before"], &run.result["points"]),
+            (&2.into(), &2.into())
+        );
     });
 }

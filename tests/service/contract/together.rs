@@ -6,7 +6,7 @@ use std::path::Path;
 use mock_bus::fault::Fault;
 use service::{
     AxisState, Code, Coordinate, Event, IfMoving, MachineState, MotionState, MotionView,
-    MoveRequest, RunKind, RunPlanView, RunRequest, RunState, StopMode,
+    MoveRequest, PathRows, PathTable, RunKind, RunPlanView, RunRequest, RunState, StopMode,
 };
 use tests::volume::{Volume, good, quick};
 use tests::{Edit, UVW, VOLUMETRIC};
@@ -413,7 +413,7 @@ fn forgets_where_an_axis_rests_that_is_switched_off(bed: &Bed<'_>) {
 
 pub(super) fn path(rows: &str) -> RunRequest {
     RunRequest {
-        path: Some(format!("time_s,x_mm,y_mm,z_mm\n{rows}")),
+        path: Some(format!("time_s,x_mm,y_mm,z_mm\n{rows}").into()),
         start: false,
         ..RunRequest::of(RunKind::Path, None)
     }
@@ -423,9 +423,11 @@ pub(super) fn path(rows: &str) -> RunRequest {
 fn has_straight_lines_too(bed: &Bed<'_>, corner: &RunRequest, planned: &RunPlanView) {
     assert_eq!(planned.join.as_deref(), Some("spline"));
     assert_eq!(planned.seconds_at_least, 2.0);
-    let rows = corner.path.as_ref().expect("it has rows");
+    let Some(PathRows::Csv(rows)) = &corner.path else {
+        panic!("{:?}", corner.path);
+    };
     let straight = RunRequest {
-        path: Some(format!("# join: linear 100um\n{rows}")),
+        path: Some(format!("# join: linear 100um\n{rows}").into()),
         ..corner.clone()
     };
     let id = bed.client.plan(&anna(), &straight).unwrap();
@@ -434,6 +436,30 @@ fn has_straight_lines_too(bed: &Bed<'_>, corner: &RunRequest, planned: &RunPlanV
     let size = plan.departure.expect("it turns a corner").size.value;
     assert!(size > 0.0 && size <= 0.1, "{size} mm");
     assert!(plan.seconds_at_least > 2.0, "it begins and ends at rest");
+}
+
+/// Rows as a table: one that cannot be followed, and what is planned of one that turns a corner.
+fn plans_tables(bed: &Bed<'_>) -> RunPlanView {
+    let table = |rows: &[[f64; 4]]| RunRequest {
+        path: Some(PathRows::Table(PathTable {
+            join: None,
+            columns: ["time_s", "x_mm", "y_mm", "z_mm"].map(str::to_owned).into(),
+            rows: rows.iter().map(|it| it.to_vec()).collect(),
+        })),
+        ..path("")
+    };
+    let beyond = table(&[[0.0, 499.0, 40.0, 30.0], [1.0, 501.0, 40.0, 30.0]]);
+    let refused = bed.client.plan(&anna(), &beyond).unwrap_err();
+    assert_eq!(refused.code, Code::Refused, "{refused}");
+    let corner = [
+        [0.0, 60.0, 40.0, 30.0],
+        [1.0, 64.0, 40.0, 30.0],
+        [2.0, 64.0, 44.0, 30.0],
+    ];
+    let id = bed.client.plan(&anna(), &table(&corner)).unwrap();
+    let planned = bed.client.run(&id, Duration::ZERO).unwrap();
+    bed.client.abort(&anna(), &id).unwrap();
+    planned.plan
 }
 
 fn follows_paths(bed: &Bed<'_>) {
@@ -467,6 +493,8 @@ fn follows_paths(bed: &Bed<'_>) {
     };
     refused(&other, Code::Refused, &["`path`"]);
 
+    let of_table = plans_tables(bed);
+
     // A corner, which a spline does not turn straight.
     let corner = path("0,60,40,30\n1,64,40,30\n2,64,44,30\n");
     let id = bed.client.plan(&anna(), &corner).unwrap();
@@ -475,6 +503,7 @@ fn follows_paths(bed: &Bed<'_>) {
         (planned.state, planned.plan.points),
         (RunState::Planned, 1001)
     );
+    assert_eq!(planned.plan, of_table, "the same rows are the same path");
     has_straight_lines_too(bed, &corner, &planned.plan);
     let travel = planned.plan.travel.expect("it is known").value;
     assert!((8.0..9.0).contains(&travel), "{travel} mm");
@@ -496,7 +525,10 @@ fn follows_paths(bed: &Bed<'_>) {
     );
     let off = off_um(bed, [64.0, 44.0, 30.0]);
     assert!(off.iter().all(|it| it.abs() < 1.0), "{off:?}");
+    stops_on_its_way(bed);
+}
 
+fn stops_on_its_way(bed: &Bed<'_>) {
     let id = bed
         .client
         .plan(&anna(), &path("0,64,44,30\n60,124,44,30\n"))
