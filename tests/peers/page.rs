@@ -29,6 +29,14 @@ fn a_person_at_the_page_takes_a_machine_through_its_cycle_and_through_a_lost_con
     for step in ["zeroed", "calibrated", "zero_again", "verified"] {
         assert_eq!(report[step], true, "{step}: {report}");
     }
+    assert_eq!(report["job"], true, "{report}");
+    for look in ["1100_light", "1100_dark", "360_light", "360_dark"] {
+        assert_eq!(report["looks"][look], true, "{look}: {report}");
+    }
+    let reached = report["keyboard"].as_array().expect("what Tab reaches");
+    for id in ["file", "rows", "Plan"] {
+        assert!(reached.iter().any(|it| it == id), "{id}: {report}");
+    }
     assert_eq!(report["errors"], json!([]), "{report}");
     assert_eq!(report["axis"], "x · Standstill", "{report}");
     let stood = report["true_mm"].as_f64();

@@ -1,15 +1,19 @@
-"""A person at the page of `truestage serve`, in headless Chromium: zero, calibrate, move, a lost connection, verify.
+"""A person at the page of `truestage serve`, in headless Chromium: zero, calibrate, move, a job that is pasted and answered,
+a lost connection, verify; what is drawn, in a narrow window, in the dark and by keyboard.
 
     page_judge.py PROGRAMS CHROMIUM
 
 PROGRAMS is the folder with `truestage` and `mock-bus`. The last line is a report in JSON.
 """
 
+import base64
 import json
+import os
 import socket
 import sys
 import threading
 import time
+from pathlib import Path
 
 from browser import Browser
 from kept_machine import PATIENCE_S, KeptMachine, Truth, wait_for
@@ -20,6 +24,19 @@ STEP_NS = 2_000_000
 PAUSE_S = 0.01
 STRIDE_NS = 1_000_000_000
 NEWEST = "document.querySelector('#runs article')"
+LIVE = "#axes canvas.live-position"
+JOB = """schema_version = 1
+axis = "x"
+settle_ms = 20
+[[point]]
+name = "load"
+position_mm = 5.0
+go_on = { operator = "lay a part on the stage" }
+[[point]]
+position_mm = 12.5
+"""
+# Where pictures of the page go, for people who want to look at them.
+SHOTS = os.environ.get("TRUESTAGE_SHOTS")
 
 
 class Pace:
@@ -80,10 +97,42 @@ class Person:
         self.browser.value(f"[...{NEWEST}.querySelectorAll('button')].find((it) => it.textContent === 'Start').click()")
         self.browser.wait_for("its begin", f"!{NEWEST}.innerText.includes('planned')")
         self.pace.slow = False
-        ended = f"/\\n(done|stopped|failed)\\n/.test({NEWEST}.innerText + '\\n')"
+        ended = f"/\\n(done|stopped|failed|timed_out)\\n/.test({NEWEST}.innerText + '\\n')"
         self.browser.wait_for(f"the end of a {kind}", ended)
         self.pace.slow = True
         return self.browser.value(f"{NEWEST}.innerText")
+
+    def job(self):
+        """Reads a job from a file as a page does, plans and starts it, and does what it asks; what the page says."""
+        self.take_control()
+        before = self.browser.value(f"{NEWEST}?.id || ''")
+        read_only = self.browser.value("document.getElementById('along').hidden")
+        self.browser.value(
+            "(() => { const kind = document.getElementById('kind'); kind.value = 'job';"
+            " kind.dispatchEvent(new Event('change')); const files = new DataTransfer();"
+            f" files.items.add(new File([{json.dumps(JOB)}], 'job.toml')); const file = document.getElementById('file');"
+            " file.files = files.files; file.dispatchEvent(new Event('change')); })()"
+        )
+        self.browser.wait_for("the text of the file", "document.getElementById('rows').value.includes('lay a part')")
+        self.browser.value("document.querySelector('#plan > button').click()")
+        self.browser.wait_for("the plan of a job", f"({NEWEST}?.id || '') !== '{before}'")
+        planned = self.browser.wait_for("what is asked", f"{NEWEST}.innerText.includes('A person is asked') && {NEWEST}.innerText")
+        self.take_control()
+        self._press("Start")
+        self.pace.slow = False
+        self.browser.wait_for("its question", f"{NEWEST}.querySelector('.question') !== null")
+        self.pace.slow = True
+        self.take_control()
+        self._press("done")
+        self.pace.slow = False
+        self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('points before')")
+        self.pace.slow = True
+        return read_only and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
+
+    def _press(self, text):
+        button = f"[...{NEWEST}.querySelectorAll('button')].find((it) => it.textContent === '{text}')"
+        self.browser.wait_for(text, f"{button} && !{button}.disabled")
+        self.browser.value(f"{button}.click()")
 
     def move(self, text):
         """Moves the axis, and waits until the page says that it stands there."""
@@ -97,6 +146,52 @@ class Person:
         return self.browser.value(shown)
 
 
+def painted(browser, canvas):
+    """How many pixels of a canvas are not empty."""
+    return browser.value(
+        f"(() => {{ const it = {canvas}; if (!it || !it.width) return 0;"
+        " const {data} = it.getContext('2d').getImageData(0, 0, it.width, it.height);"
+        " let count = 0; for (let at = 3; at < data.length; at += 4) count += data[at] > 0; return count; })()"
+    )
+
+
+def painted_at_last(browser, canvas, more):
+    """The same, when it is more than that or nobody waits any longer: a picture comes with the next sample."""
+    limit = time.monotonic() + PATIENCE_S
+    while (count := painted(browser, canvas)) <= more and time.monotonic() < limit:
+        time.sleep(0.1)
+    return count
+
+
+def looks(browser, folder):
+    """What is drawn in a wide window and in a narrow one, light and dark; whether anything is wider than the window."""
+    report = {}
+    for width, theme in ((1100, "light"), (1100, "dark"), (360, "light"), (360, "dark")):
+        browser.command("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        browser.command("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        name = f"{width}_{theme}"
+        wide = browser.value("document.documentElement.scrollWidth")
+        run = painted_at_last(browser, "document.querySelector('#runs canvas')", 1000)
+        live = painted_at_last(browser, f"document.querySelector('{LIVE}')", 500)
+        report[name] = wide <= width and run > 1000 and live > 500 or [wide, run, live]
+        if folder:
+            shot = browser.command("Page.captureScreenshot", format="png", captureBeyondViewport=True)
+            (Path(folder) / f"{name}.png").write_bytes(base64.b64decode(shot["data"]))
+    browser.command("Emulation.clearDeviceMetricsOverride")
+    return report
+
+
+def by_keyboard(browser):
+    """Tab from the kind of a run through what a path needs to its button."""
+    browser.value("document.getElementById('kind').focus()")
+    reached = []
+    for _ in range(6):
+        for kind in ("keyDown", "keyUp"):
+            browser.command("Input.dispatchKeyEvent", type=kind, key="Tab", code="Tab", windowsVirtualKeyCode=9)
+        reached.append(browser.value("document.activeElement.id || document.activeElement.textContent"))
+    return reached
+
+
 def commanded(kept, browser):
     """The whole day; a report."""
     pace = Pace(kept.clock)
@@ -107,6 +202,10 @@ def commanded(kept, browser):
     report = {"zeroed": "done" in person.run("zero"), "calibrated": "done" in person.run("calibrate")}
     report["position"] = person.move("12.5mm")
     report["true_mm"] = Truth(kept.clock).position_mm()
+    browser.value("document.querySelector('#axes details').open = true")
+    report["looks"] = looks(browser, SHOTS)
+    report["job"] = person.job()
+    report["keyboard"] = by_keyboard(browser)
     errors = list(browser.errors)
     kept.kill_service()
     browser.wait_for("word of the lost connection", f"{state}.includes('connection lost')")

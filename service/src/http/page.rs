@@ -10,7 +10,7 @@ use axum::routing::get;
 use super::state::State;
 
 /// Where each file is, what it is, and what it says.
-const FILES: [(&str, &str, &str); 3] = [
+const FILES: [(&str, &str, &str); 4] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -25,6 +25,11 @@ const FILES: [(&str, &str, &str); 3] = [
         "/page.js",
         "text/javascript; charset=utf-8",
         include_str!("page/page.js"),
+    ),
+    (
+        "/curve.js",
+        "text/javascript; charset=utf-8",
+        include_str!("page/curve.js"),
     ),
 ];
 
@@ -72,7 +77,6 @@ mod tests {
     /// What comes from outside, a name of a client for one, must stay text.
     #[test]
     fn the_page_sets_text_and_never_markup() {
-        let (_, _, script) = FILES[2];
         for way in [
             "innerHTML",
             "outerHTML",
@@ -80,7 +84,9 @@ mod tests {
             "document.write",
             "eval(",
         ] {
-            assert!(!script.contains(way), "{way}");
+            for (path, _, text) in FILES {
+                assert!(!text.contains(way), "{way} in {path}");
+            }
         }
         let (_, _, markup) = FILES[0];
         // The policy would refuse them in silence.

@@ -2,19 +2,29 @@
 // client asks. Everything from outside is set as text, never as markup.
 "use strict";
 
+import { Trace, draw, ofRun } from "/curve.js";
+
 const LEASE_S = 10;
 const RENEW_MS = 3000;
 // The service stops a jog 200 ms after the last word.
 const JOG_MS = 60;
 const EVENTS_SHOWN = 60;
+const LIVE_S = 20;
+// What is asked for with a text: where it goes, and what it is.
+const ALONG = { path: ["path", "Rows: time_s,x_mm,y_mm,z_mm"], first_part: ["path", "Rows: time_s,x_mm,y_mm,z_mm"],
+  job: ["job", "The job, as a .toml file has it"] };
 
 const byId = (id) => document.getElementById(id);
 let token = null;
 let renewing = null;
+let renewal = null;
 const plans = new Map();
 const together = new Set();
+const traces = new Map();
 
 async function ask(method, path, body) {
+  // An order on its way with the token before would be that of somebody else; a stop never waits.
+  if (renewal && method !== "GET" && path !== "/v1/lease" && path !== "/v1/stop") await renewal;
   const headers = { "content-type": "application/json", "truestage-client": "page" };
   if (token) headers["truestage-lease"] = token;
   const answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
@@ -85,7 +95,7 @@ async function take() {
   const leased = await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S, force });
   token = leased.token;
   clearInterval(renewing);
-  renewing = setInterval(renew, RENEW_MS);
+  renewing = setInterval(() => { renewal = renew().finally(() => { renewal = null; }); }, RENEW_MS);
   showControl();
 }
 
@@ -208,11 +218,27 @@ function showAxes(list) {
       return [term, value];
     });
     shown.querySelector("dl").replaceChildren(...rows);
+    showLive(axis, shown);
     const off = axis.state === "Disabled";
     const power = shown.querySelector(".power");
     power.textContent = off ? "Enable" : "Disable";
     power.dataset.verb = off ? "enable" : "disable";
   }
+}
+
+// Where it was and how far from its target, as long as somebody looks.
+function showLive(axis, shown) {
+  const place = axis.position || axis.encoder;
+  if (!place) return;
+  if (!traces.has(axis.name)) traces.set(axis.name, new Trace(LIVE_S));
+  const trace = traces.get(axis.name);
+  trace.push(performance.now() / 1000, place.value, axis.target ? axis.target.value : null);
+  if (!shown.querySelector("details").open) return;
+  const turns = place.unit === "deg";
+  const { position, deviation } = trace.lines(turns ? 3600 : 1000);
+  const span = { x: "s", spanX: [-LIVE_S, 0] };
+  draw(shown.querySelector(".live-position"), position, { ...span, y: unit(place), leastY: 1e-4 });
+  draw(shown.querySelector(".live-deviation"), deviation, { ...span, y: turns ? "arcsec from the target" : "µm from the target", leastY: 0.1 });
 }
 
 // What a calibration adds, in the unit of small things.
@@ -256,7 +282,7 @@ function asking(run) {
 // A run only ever goes on: what was asked for before an event came may arrive after it. What is older than a state:
 const UNDER_WAY = ["planned", "running", "stopping", "paused"];
 const OLDER = { planned: [], running: ["planned"], stopping: ["planned", "running"], paused: ["planned", "stopping"],
-  done: UNDER_WAY, stopped: UNDER_WAY, failed: UNDER_WAY };
+  done: UNDER_WAY, stopped: UNDER_WAY, failed: UNDER_WAY, timed_out: UNDER_WAY };
 
 function showRun(run) {
   const known = plans.get(run.id);
@@ -275,6 +301,15 @@ function showRun(run) {
     const list = document.createElement("ol");
     list.append(...asks.map((it) => element("li", it)));
     parts.push(element("p", "A person is asked:"), list);
+  }
+  if (run.state === "planned" && run.plan.departure) {
+    const { size, at_s: when, lines } = run.plan.departure;
+    parts.push(element("p", `at most ${number(size, 3)} from the straight joins of its rows, at ${when.toFixed(3)} s (lines ${lines.join(" to ")})`));
+  }
+  if (run.said && run.said.length) {
+    const said = element("div", "", "said");
+    said.append(...run.said.map((it) => element("p", it)));
+    parts.push(said);
   }
   if (run.question) {
     const same = asked && asked.dataset.number === String(run.question.number);
@@ -295,12 +330,40 @@ function showRun(run) {
     list.append(...rows);
     parts.push(list);
   }
+  const curve = run.state === "done" ? curveOf(run) : [];
+  parts.push(...curve);
   const doing = document.createElement("p");
   if (run.state === "planned") doing.append(button("Start", () => ask("POST", `/v1/runs/${run.id}/start`)));
   if (run.state === "running" && run.can_resume) doing.append(button("Pause", () => ask("POST", `/v1/runs/${run.id}/pause`)));
   if (run.state === "paused") doing.append(button("Resume", () => ask("POST", `/v1/runs/${run.id}/resume`)));
   if (["planned", "running", "paused"].includes(run.state)) doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
   shown.replaceChildren(...parts, doing);
+  redraw(shown);
+}
+
+// What it found, as a curve, and what each line of it is.
+function curveOf(run) {
+  const others = [...plans.values()].reverse();
+  const curve = ofRun(run, others);
+  if (!curve || !curve.lines.length) return [];
+  const canvas = document.createElement("canvas");
+  canvas.setAttribute("role", "img");
+  const values = curve.lines.flatMap((it) => it.points.map(([, y]) => y));
+  const [low, high] = [Math.min(...values), Math.max(...values)].map((it) => it.toFixed(3));
+  canvas.setAttribute("aria-label", `${run.kind} of ${run.of}: from ${low} to ${high} ${curve.y}`);
+  canvas.curve = curve;
+  const legend = element("ul", "", "legend");
+  for (const { name, dashed, colour } of curve.lines) {
+    legend.append(element("li", name, [dashed && "dashed", colour === "--soft" && "before"].filter(Boolean).join(" ")));
+  }
+  return [canvas, legend];
+}
+
+// Once it has a size, and whenever that or the colours change.
+function redraw(within) {
+  for (const canvas of within.querySelectorAll("canvas")) {
+    if (canvas.curve) draw(canvas, canvas.curve.lines, { ...canvas.curve, leastY: 1e-3 });
+  }
 }
 
 function showEvent(event) {
@@ -343,9 +406,34 @@ byId("reset").addEventListener("click", () => told(ask("POST", "/v1/reset")));
 byId("plan").addEventListener("submit", (event) => {
   event.preventDefault();
   const request = { kind: byId("kind").value };
-  if (byId("axis").value) request.axis = byId("axis").value;
+  const along = ALONG[request.kind];
+  if (along) {
+    // What it is says which axes follow it.
+    request[along[0]] = byId("rows").value;
+    if (along[0] === "path" && agreed(byId("uncompensated"))) request.uncompensated = true;
+  } else if (byId("axis").value) {
+    request.axis = byId("axis").value;
+  }
   told(ask("POST", "/v1/runs", request).then(showRun));
 });
+byId("kind").addEventListener("change", showAlong);
+byId("file").addEventListener("change", () => {
+  const [file] = byId("file").files;
+  if (file) told(file.text().then((text) => { byId("rows").value = text; }));
+});
+window.addEventListener("resize", () => redraw(document));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw(document));
 
+// A text is asked for where a run needs one.
+function showAlong() {
+  const along = ALONG[byId("kind").value];
+  byId("along").hidden = !along;
+  byId("axis-label").hidden = Boolean(along);
+  byId("rows").required = Boolean(along);
+  byId("uncompensated-label").hidden = !along || along[0] !== "path";
+  if (along) byId("along-title").textContent = along[1];
+}
+
+showAlong();
 showControl();
 told(showAll().then(() => ask("GET", "/v1/machine")).then((machine) => follow(Math.max(0, machine.newest_event - EVENTS_SHOWN))));
