@@ -4,9 +4,9 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use service::{
-    AnswerRequest, AxisView, CalibrationView, Caller, ChosenView, Desk, Event, JogRequest, LeaseRequest,
-    Leased, MachineView, MotionView, MoveRequest, Problem, RunKind, RunRequest, RunState, RunView,
-    StopMode,
+    AnswerRequest, AxisView, CalibrationView, Caller, ChosenView, Desk, Event, JogRequest,
+    LeaseRequest, Leased, MachineView, MotionView, MoveRequest, Problem, RunKind, RunRequest,
+    RunState, RunView, StopMode,
 };
 
 use crate::stage::{Gate, Stage};

@@ -11,8 +11,8 @@ const LIBRARY: &str = "controller/src/lib.rs";
 const LIST: &str = "tests/tidy/public_names.txt";
 
 /// How many names somebody else's program may be promised; whoever takes one off the list lowers it. The last was
-/// raised for what whoever keeps a machine writes to move any kind of it as one and along paths (decision 0048).
-const PROMISED_MAX: usize = 85;
+/// raised for what whoever keeps a machine writes to choose calibrations and to do jobs (decision 0052).
+const PROMISED_MAX: usize = 90;
 
 /// The packages whose modules may be offered under another roof.
 const PACKAGES: &[&str] = &[

@@ -9,13 +9,14 @@ use serde_json::{Value, json};
 use crate::groups;
 use crate::program::belongs::head_of;
 use crate::program::cal_page;
+use crate::program::chosen::{Used, told};
 use crate::program::controls::export::{self, ExportArgs};
 use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kept::or_by_its_service;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::show::Shown;
-use crate::runs::{Change, Choice, changes_of, chosen_of, write};
+use crate::runs::{Change, Choice, Group, write};
 use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
@@ -237,7 +238,7 @@ fn choose(path: &Path, choice: &Choice) -> Result<Vec<Change>, Failure> {
     };
     let _lease = Lease::take(&store, verb)?;
     let groups = groups(&loaded.config);
-    let changes = changes_of(chosen_of(&groups, &store, choice)?, &store, choice)?;
+    let changes = Group::chosen(&groups, &store, choice)?.changes(&store, choice)?;
     for id in changes.iter().filter_map(|it| it.id.as_ref()) {
         head_of(&loaded, &store, id)?;
     }
@@ -251,42 +252,6 @@ fn put_into_use(path: &Path, id: &str) -> Result<(String, String), Failure> {
     let used = changes.into_iter().next();
     let used = used.and_then(|it| Some((it.pointer, it.id?)));
     Ok(used.expect("what is activated is in use"))
-}
-
-/// What is used under one name of the store.
-pub(crate) struct Used<'u> {
-    pub(crate) pointer: &'u str,
-    pub(crate) id: Option<&'u str>,
-    /// Whether it was gone back to.
-    pub(crate) is_earlier: bool,
-}
-
-impl Used<'_> {
-    fn text(&self) -> String {
-        let pointer = self.pointer;
-        match (self.id.map(short), self.is_earlier) {
-            (Some(id), true) => format!("axis {pointer}: back to {id}"),
-            (Some(id), false) => format!("axis {pointer}: {id} is in use"),
-            (None, _) => format!("axis {pointer}: nothing is in use"),
-        }
-    }
-}
-
-/// What came of `choice`.
-pub(crate) fn told(choice: &Choice, all: &[Used<'_>], output: Output) -> Ended {
-    let lines: Vec<_> = all.iter().map(Used::text).collect();
-    let value = match (all, choice) {
-        ([only], _) => json!({"axis": only.pointer, "active": only.id}),
-        (all, choice) => {
-            let name = match choice {
-                Choice::Rollback(name) => Some(name.as_str()),
-                Choice::Activate(_) => all.first().map(|it| it.pointer),
-            };
-            let active = all.iter().map(|it| (it.pointer.to_owned(), json!(it.id)));
-            json!({"axis": name, "active": active.collect::<serde_json::Map<_, _>>()})
-        }
-    };
-    output.result(&lines.join("\n"), &value)
 }
 
 #[cfg(test)]

@@ -15,13 +15,13 @@ use units::Time;
 
 use crate::Failure;
 use crate::program::answering::{Answering, Asked};
-use crate::program::cal::{Used, told};
+use crate::program::chosen::{Used, told};
 use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
-use crate::runs::Choice;
 use crate::program::{AskArgs, AxisArgs, CalibrateArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
+use crate::runs::Choice;
 use machine::{Observer as _, Stage, StopRequest};
 
 /// How long an answer is held back: Ctrl-C is looked for so often.
@@ -115,7 +115,10 @@ impl Service {
     /// Uses another calibration from now on.
     pub(crate) fn choose(&self, choice: &Choice, output: Output) -> Ended {
         let (path, body) = match choice {
-            Choice::Activate(id) => (format!("/v1/calibrations/{}/activate", plain(id)), json!({})),
+            Choice::Activate(id) => (
+                format!("/v1/calibrations/{}/activate", plain(id)),
+                json!({}),
+            ),
             Choice::Rollback(axis) => ("/v1/calibrations/rollback".into(), json!({"axis": axis})),
         };
         let chosen = ask(&self.at, "POST", &path, &body.to_string())?;

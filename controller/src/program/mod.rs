@@ -9,6 +9,7 @@ mod budget;
 mod cal;
 mod cal_page;
 mod check;
+mod chosen;
 mod controls;
 mod data;
 mod data_file;

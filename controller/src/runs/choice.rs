@@ -2,9 +2,6 @@
 
 use machine::records::{Store, StoreError};
 
-use super::group::Group;
-use crate::failure::Failure;
-
 /// What somebody wants to be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
@@ -16,7 +13,7 @@ pub enum Choice {
 
 impl Choice {
     /// What the store calls what it is about.
-    fn of(&self, store: &Store) -> Result<String, StoreError> {
+    pub(super) fn of(&self, store: &Store) -> Result<String, StoreError> {
         match self {
             Self::Activate(beginning) => {
                 let id = store.resolve(beginning)?;
@@ -70,53 +67,32 @@ impl Change {
     }
 }
 
-/// The group of `groups` that `choice` is about.
+/// What `choice` itself changes of what is used under these `pointers`.
 ///
 /// # Errors
-/// When there is none, or no such calibration.
-pub(crate) fn chosen_of<'g>(
-    groups: &'g [Group],
+/// When there is no such calibration, or none before.
+pub(super) fn chosen_among(
+    pointers: &[String],
     store: &Store,
     choice: &Choice,
-) -> Result<&'g Group, Failure> {
-    let of = choice.of(store)?;
-    let found = groups.iter().find(|it| it.is_about(&of));
-    found.ok_or_else(|| {
-        let known = groups.iter().flat_map(|it| it.pointers.iter().cloned());
-        let known: Vec<_> = known.collect();
-        Failure::Machine(machine::Failure::NoSuchAxis {
-            axis: of,
-            known: known.join(", "),
-        })
-    })
-}
-
-/// What `choice` changes of what `group` uses. Nothing is written.
-///
-/// # Errors
-/// When there is no such calibration, none before, or it does not go with the others in use.
-pub(crate) fn changes_of(
-    group: &Group,
-    store: &Store,
-    choice: &Choice,
-) -> Result<Vec<Change>, Failure> {
-    let chosen = match choice {
+) -> Result<Vec<Change>, StoreError> {
+    match choice {
         Choice::Activate(beginning) => {
             let id = store.resolve(beginning)?;
             let pointer = store.glance(&id)?.head.axis;
-            vec![Change {
+            Ok(vec![Change {
+                pointer,
+                id: Some(id),
                 is_earlier: false,
-                ..Change::to(store, &pointer, id)?
-            }]
+            }])
         }
-        Choice::Rollback(name) if group.pointers.contains(name) => vec![Change::back(store, name)?],
+        Choice::Rollback(name) if pointers.contains(name) => Ok(vec![Change::back(store, name)?]),
         // All of them, or none.
         Choice::Rollback(_) => {
-            let all = group.pointers.iter().map(|it| Change::back(store, it));
-            all.collect::<Result<_, _>>()?
+            let all = pointers.iter().map(|it| Change::back(store, it));
+            all.collect()
         }
-    };
-    (group.runs.with_companions)(store, chosen)
+    }
 }
 
 /// Writes what is used from now on; all of it was read and can be used.

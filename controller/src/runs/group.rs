@@ -3,11 +3,12 @@
 use machine::Stage;
 use machine::records::Store;
 
-use super::choice::{Change, Choice, changes_of, chosen_of, write};
+use super::choice::{Change, Choice, chosen_among, write};
 use super::job::JobJudge;
 use super::path::PathJudge;
 use super::person::Person;
-use super::task::{Found, Planned, Task, Work};
+use super::planned::Planned;
+use super::task::{Found, Task, Work};
 use super::teller::Teller;
 use super::together::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, Part};
 use crate::config::MachineConfig;
@@ -182,7 +183,25 @@ impl Group {
         store: &Store,
         choice: &Choice,
     ) -> Result<&'g Self, Failure> {
-        chosen_of(groups, store, choice)
+        let of = choice.of(store)?;
+        let found = groups.iter().find(|it| it.is_about(&of));
+        found.ok_or_else(|| {
+            let known = groups.iter().flat_map(|it| it.pointers.iter().cloned());
+            let known: Vec<_> = known.collect();
+            Failure::Machine(machine::Failure::NoSuchAxis {
+                axis: of,
+                known: known.join(", "),
+            })
+        })
+    }
+
+    /// What `choice` changes of what it uses. Nothing is written.
+    ///
+    /// # Errors
+    /// When there is no such calibration, none before, or it does not go with the others in use.
+    pub(crate) fn changes(&self, store: &Store, choice: &Choice) -> Result<Vec<Change>, Failure> {
+        let chosen = chosen_among(&self.pointers, store, choice)?;
+        (self.runs.with_companions)(store, chosen)
     }
 
     /// Uses what `choice` says from now on, now and after the next start; says what that changed. Nothing moves: the
@@ -196,7 +215,7 @@ impl Group {
         store: &Store,
         choice: &Choice,
     ) -> Result<Vec<Change>, Failure> {
-        let changes = changes_of(self, store, choice)?;
+        let changes = self.changes(store, choice)?;
         (self.runs.usable)(machine, store, &changes)?;
         write(store, &changes)?;
         self.load(machine, store)?;

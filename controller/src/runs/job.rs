@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use machine::records::Store;
 
-use super::task::Planned;
+use super::planned::Planned;
 use crate::failure::Failure;
 
 /// A job that was judged, and what it will do.
@@ -47,7 +47,9 @@ impl fmt::Debug for JudgedJob {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("JudgedJob");
         shown.field("axis", &self.axis);
-        shown.field("planned", &self.planned).finish_non_exhaustive()
+        shown
+            .field("planned", &self.planned)
+            .finish_non_exhaustive()
     }
 }
 

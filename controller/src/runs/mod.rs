@@ -9,6 +9,7 @@ mod group;
 mod job;
 mod path;
 mod person;
+mod planned;
 mod task;
 mod teller;
 mod together;
@@ -18,12 +19,13 @@ pub use group::{Group, Moved};
 pub use job::{AskedJob, JobJudge, JudgedJob};
 pub use path::{JudgedPath, PathJudge};
 pub use person::{Person, Question};
-pub use task::{Found, Planned, Task, Travel};
+pub use planned::{Planned, Travel};
+pub use task::{Found, Task};
 pub use teller::{Teller, Told};
 pub use together::{GroupMove, GroupMoved, Judge, Part, PartMoved, Place};
 
 #[cfg(feature = "program")]
-pub(crate) use choice::{changes_of, chosen_of, write};
+pub(crate) use choice::write;
 pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]

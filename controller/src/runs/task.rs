@@ -1,13 +1,11 @@
 //! What is run, what it will take, and what came of it.
 
 use core::any::Any;
-use core::time::Duration;
 use std::path::PathBuf;
 
 use machine::Stage;
 use machine::records::Store;
 use serde_json::Value;
-use units::{Metres, Radians};
 
 use super::job::JudgedJob;
 use super::path::JudgedPath;
@@ -73,28 +71,6 @@ impl Task {
             ..CalibrateOptions::default()
         }
     }
-}
-
-/// How far something goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Travel {
-    /// Along a way.
-    Length(Metres),
-    /// Round and round.
-    Angle(Radians),
-}
-
-/// What a run will do.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Planned {
-    /// How many points are measured.
-    pub points: u64,
-    /// How far the axis goes for them, where that is known.
-    pub travel: Option<Travel>,
-    /// How long that takes at least, without becoming warm.
-    pub at_least: Duration,
-    /// What a person will be asked, in this order.
-    pub asks: Vec<String>,
 }
 
 /// What a procedure works with.

@@ -13,8 +13,8 @@ use crate::runs::{
     Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
 };
 use crate::volumetric::asked::Asking;
-use crate::volumetric::chosen;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
+use crate::volumetric::chosen;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::motion::{MOVES, require_measured};
 use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricTeller, WarmUp};
@@ -162,7 +162,10 @@ fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
     let (points, is_corrected) = (judged.path.points.clone(), !task.uncompensated);
     let mut volume = work.machine.volumetric()?;
     let (followed, kept) = match task.first_part {
-        false => (volume.follow_stored(work.store, points, is_corrected)?, None),
+        false => (
+            volume.follow_stored(work.store, points, is_corrected)?,
+            None,
+        ),
         true => {
             let ready = volume.first_part(work.store)?;
             let (followed, kept) = volume.follow_part(work.store, ready, points)?;

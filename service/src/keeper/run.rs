@@ -11,8 +11,8 @@ use serde_json::json;
 use truestage::runs::{self, Found, Group};
 
 use super::mechanics::Mechanics;
-use super::setup::shown;
 use super::seat::Task as SeatTask;
+use super::setup::shown;
 use super::stop::{cause_of, stopped_by};
 use super::{Job, Keeper, Mode};
 use crate::order::Judged;
