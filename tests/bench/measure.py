@@ -3,10 +3,11 @@
     measure.py bus PROGRAMS    SDO round trips, SYNC jitter and the cyclic engine on vcan0
     measure.py host PROGRAMS   corrections, rotary self-calibration, SYNC jitter without CAN, and
                                the cyclic engine on a pseudo-terminal
+    measure.py load PROGRAMS   a service beside clients and floods, and beside the command line
 
 PROGRAMS names the benchmark programs: {"sdo": path, "table": path, "rotary": path,
-"volumetric": path, "sync": path, "cycle": path}.
-The caller pins this process to one core; what it starts inherits that.
+"volumetric": path, "sync": path, "cycle": path, "load": path, "truestage": path}.
+The caller pins this process to one core, except for `load`; what it starts inherits that.
 """
 
 import contextlib
@@ -36,6 +37,9 @@ FIFO_PRIORITY = 40
 # Four axes; the first of these periods that the computer bears.
 CYCLE_PERIODS_MS = ["2.0", "5.0", "10.0", "20.0"]
 CYCLE_S = "5" if QUICK else "60"
+
+# Of each kind by turns.
+LOAD_TURN_S, LOAD_ROUNDS = ("4", "1") if QUICK else ("10", "5")
 
 COUNTED_CALLS = 200_000
 COUNTED = [("linear", 20), ("linear", 20_000), ("monotone cubic", 20), ("monotone cubic", 20_000)]
@@ -203,6 +207,9 @@ def main(place, programs):
                 [("screws", False), ("screws", True), ("volumetric", False)],
             ),
         }
+    elif place == "load":
+        words = ["show", LOAD_TURN_S, LOAD_ROUNDS, programs["truestage"]]
+        measured = run([programs["load"], *words])
     else:
         measured = {
             "table": run([programs["table"], "times"]),

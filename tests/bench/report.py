@@ -1,6 +1,6 @@
 """Prints what was measured: a table for people, then one JSON object on the last line.
 
-`report.py VCAN_HOST HOST_JSON [BUS_JSON]`: VCAN_HOST says where vcan0 was; without BUS_JSON
+`report.py VCAN_HOST HOST_JSON LOAD_JSON [BUS_JSON]`: VCAN_HOST says where vcan0 was; without BUS_JSON
 nothing was measured there.
 """
 
@@ -140,6 +140,24 @@ def show_virtual_time(cases):
         )
 
 
+def show_load(load):
+    print("\nA service: SYNC lateness in us, and ms from a command to its first frame")
+    columns = ("SYNC p50", "p99", "lone p99", "left out", "to nothing", "frame p50", "p99", "max")
+    line(("load", 12), *((name, 12) for name in columns))
+    for turn in load["turns"]:
+        frame = turn["command_to_frame_ms"]
+        line(
+            (turn["load"], 12),
+            *((f"{turn[key]:.0f}", 12) for key in ("sync_p50_us", "sync_p99_us", "lone_p99_us", "left_out")),
+            (f"{turn['p99_to_nothing']['median']:.2f}", 12),
+            *((f"{frame[key]:.2f}", 12) for key in ("p50", "p99", "max")),
+        )
+    again = load["second_motion"]
+    if again:
+        times = ", ".join(f"{it:.1f}" for it in again["command_line_s"])
+        line((f"a second motion: {again['service_s'] * 1e3:.2f} ms; by the command line {times} s", 0))
+
+
 def growth_of(table):
     """How much longer a call takes in the longest table than in the shortest, in a row."""
     least = {}
@@ -161,13 +179,20 @@ def goals_of(measured):
         goals[name] = {"measured": points[name], "at_most": at_most}
     speeds = {it["machine"]: it["times_real_time"] for it in measured["host"]["virtual_time"]}
     goals["linear_stage_in_virtual_time"] = {"measured": speeds["linear"], "at_least": 1000.0}
+    turns = {turn["load"]: turn for turn in measured["load"]["turns"]}
+    for name in ("clients", "flood"):
+        ratio = turns[name]["p99_to_nothing"]["median"]
+        goals[f"sync_p99_{name}_to_nothing"] = {"measured": ratio, "at_most": 1.1}
+    frames = max(turns[name]["command_to_frame_ms"]["p99"] for name in ("clients", "flood"))
+    limit = measured["load"]["command_to_frame_limit_ms"]
+    goals["command_to_frame_p99_ms"] = {"measured": frames, "at_most": limit}
     if "bus" in measured:
         ratio = measured["bus"]["sdo"]["ours_to_python"]["median"]
         goals["ours_to_python"] = {"measured": ratio, "at_least": 5.0}
     return goals
 
 
-def main(vcan_host, host_file, bus_file=None):
+def main(vcan_host, host_file, load_file, bus_file=None):
     measured = {
         "date": datetime.date.today().isoformat(),
         "machine": platform.machine(),
@@ -176,6 +201,8 @@ def main(vcan_host, host_file, bus_file=None):
     }
     with open(host_file, encoding="utf-8") as file:
         measured["host"] = json.load(file)
+    with open(load_file, encoding="utf-8") as file:
+        measured["load"] = json.load(file)
     measured["growth"] = growth_of(measured["host"]["table"])
     show_table(
         measured["host"]["table"], measured["host"]["table_instructions"], measured["growth"]
@@ -186,6 +213,7 @@ def main(vcan_host, host_file, bus_file=None):
     show_cycle("on a pseudo-terminal", measured["host"]["cycle"])
     show_cycle_cost(measured["host"]["cycle_cost"])
     show_virtual_time(measured["host"]["virtual_time"])
+    show_load(measured["load"])
     if bus_file:
         with open(bus_file, encoding="utf-8") as file:
             measured["bus"] = json.load(file)

@@ -1,6 +1,6 @@
 //! A flood, in real time: the machine's thread goes on, and a stop is heard.
 //!
-//! How late a busy computer is, no test decides (`bench/load.rs` measures it): where threads that wait for nothing are late,
+//! How late a busy computer is, no test decides (`bench/load/main.rs` measures it): where threads that wait for nothing are late,
 //! too, nothing is learnt from it.
 
 use std::io::{Read, Write};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use machine::Patience;
 use service::{Access, Caller, Desk, Edge, Listen, MachineState, Opened, Service};
 use tests::flood::flood;
-use tests::{LINEAR, Rig, not_run, rigs, shipped_config};
+use tests::{LINEAR, Rig, Shipped, not_run, rigs, shipped_config};
 use truestage::emulated::EmulatedOnPtys;
 use truestage::{Machine, ports};
 
@@ -25,11 +25,15 @@ const BEAT: Duration = Duration::from_millis(5);
 /// A stop that is not answered by then never is.
 const LATE: Duration = Duration::from_secs(60);
 
-/// A service that keeps an emulated machine in real time.
-fn kept(folder: &std::path::Path, emulated: &EmulatedOnPtys) -> Service {
-    let mut loaded = shipped_config(&LINEAR, folder, |text| text);
+/// A service that keeps the emulated machine `shipped` in real time.
+pub(crate) fn kept(
+    shipped: &Shipped,
+    folder: &std::path::Path,
+    emulated: &EmulatedOnPtys,
+) -> Service {
+    let mut loaded = shipped_config(shipped, folder, |text| text);
     let overrides = emulated.overrides(&loaded.config).unwrap();
-    let pace = emulated.pace("a flood").unwrap();
+    let pace = emulated.pace("a service").unwrap();
     // The emulated drives share the processors with the flood.
     loaded.patience = Patience::with_clock(1.001);
     let store = loaded.config.machine.store();
@@ -93,7 +97,7 @@ fn a_machine_goes_on_in_a_flood_and_a_stop_is_heard() {
     }
     let folder = tempfile::tempdir().unwrap();
     let emulated = EmulatedOnPtys::start(LINEAR.emulated, 51, 1.0).unwrap();
-    let service = kept(folder.path(), &emulated);
+    let service = kept(&LINEAR, folder.path(), &emulated);
     let desk = service.desk();
     let any = "tcp:127.0.0.1:0".parse().unwrap();
     let edge = Edge::open(desk.clone(), &[any], &Access::default()).unwrap();

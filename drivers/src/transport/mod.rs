@@ -28,6 +28,8 @@ mod open_error;
 #[cfg(feature = "live")]
 mod os;
 #[cfg(feature = "live")]
+mod processors;
+#[cfg(feature = "live")]
 pub mod real_time;
 #[cfg(feature = "live")]
 mod serial;

@@ -9,13 +9,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use axum::serve::Listener;
-use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::net::{TcpListener, TcpSocket, TcpStream, UnixListener, UnixStream};
 
 use super::place::Listen;
 use crate::access::{Access, Tls};
 
 /// Who may connect to the Unix socket: its owner and its group.
 const MODE: u32 = 0o660;
+
+/// So much may come by a TCP connection before it is heard, in bytes. The system's own choice grows to megabytes, which it
+/// copies in one go while its processor does nothing else, whatever waits there: a flood is to fill little.
+const UNHEARD_MAX: u32 = 64 << 10;
+
+/// So many TCP connections wait for one of the places; the system lets others try again.
+const WAITING_MAX: u32 = 1024;
 
 /// Who is at the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,10 +106,18 @@ impl Door {
 }
 
 fn listen(address: SocketAddr) -> io::Result<(TcpListener, SocketAddr)> {
-    let listener = std::net::TcpListener::bind(address)?;
-    listener.set_nonblocking(true)?;
+    let socket = match address {
+        SocketAddr::V4(_) => TcpSocket::new_v4()?,
+        SocketAddr::V6(_) => TcpSocket::new_v6()?,
+    };
+    // A service that is started again listens where the one before has just done so.
+    socket.set_reuseaddr(true)?;
+    // Connections inherit it.
+    socket.set_recv_buffer_size(UNHEARD_MAX)?;
+    socket.bind(address)?;
+    let listener = socket.listen(WAITING_MAX)?;
     let address = listener.local_addr()?;
-    Ok((TcpListener::from_std(listener)?, address))
+    Ok((listener, address))
 }
 
 async fn accept_tcp(listener: &mut TcpListener) -> (TcpStream, Peer) {

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use axum::Json;
-use axum::body::Bytes;
+use axum::body::{Bytes, HttpBody};
 use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -138,8 +138,11 @@ pub(super) async fn guard(
     }
 }
 
-/// All of a body, also where nobody asks for it.
+/// All of a body, also where nobody asks for it. One that says that it is far too large is not heard at all.
 async fn whole(body: axum::body::Body, most: usize) -> Result<Vec<u8>, Problem> {
+    if body.size_hint().lower() > HEARD_MAX as u64 {
+        return Err(too_large(most));
+    }
     let mut stream = body.into_data_stream();
     let (mut whole, mut length) = (Vec::new(), 0);
     while let Some(part) = stream.next().await {
@@ -155,8 +158,12 @@ async fn whole(body: axum::body::Body, most: usize) -> Result<Vec<u8>, Problem> 
     if length <= most {
         return Ok(whole);
     }
+    Err(too_large(most))
+}
+
+fn too_large(most: usize) -> Problem {
     let what = format!("a request of more than {} kB", most >> 10);
-    Err(Problem::new(Code::TooLarge, what, ""))
+    Problem::new(Code::TooLarge, what, "")
 }
 
 fn check(pages: Pages, headers: &HeaderMap) -> Result<(), Problem> {
