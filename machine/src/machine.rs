@@ -26,6 +26,7 @@ use crate::parts::{AxisSettings, Bus, Parts};
 use crate::patience::Patience;
 use crate::ports::Ports;
 use crate::stop_request::StopRequest;
+use crate::sync_account::SyncAccount;
 
 pub(crate) use attendant::call as call_attendant;
 pub use attendant::{Attendant, attend};
@@ -111,6 +112,7 @@ impl Machine {
             .into_iter()
             .map(|it| (it.unit, it.settings))
             .unzip();
+        let syncs = SyncAccount::new(&parts.buses);
         let heartbeat = |bus: &Bus| (bus.port, HeartbeatProducer::new(bus.master, bus.heartbeat));
         Self {
             heartbeats: parts.buses.iter().map(heartbeat).collect(),
@@ -132,6 +134,7 @@ impl Machine {
                 buses: parts.buses,
                 lines: parts.lines,
                 is_synchronous: false,
+                syncs,
             },
             patience: parts.patience,
             transport,

@@ -7,6 +7,7 @@ use wire::Port;
 
 use crate::failure::Failure;
 use crate::parts::Bus;
+use crate::sync_account::SyncAccount;
 
 /// What a machine is connected to.
 pub(crate) struct Ports {
@@ -16,6 +17,8 @@ pub(crate) struct Ports {
     pub(crate) lines: BTreeMap<Port, String>,
     /// Whether the transport sends SYNC.
     pub(crate) is_synchronous: bool,
+    /// What became of SYNCs.
+    pub(crate) syncs: SyncAccount,
 }
 
 impl Ports {
@@ -36,6 +39,10 @@ impl Ports {
         self.is_synchronous = on;
         for bus in &self.buses {
             let period = on.then_some(bus.sync_period);
+            let ending = transport.sync_statistics(bus.port).filter(|_| !on);
+            if let Some(thread) = ending {
+                self.syncs.ended(bus.port, &thread);
+            }
             transport
                 .set_sync(bus.port, period)
                 .map_err(|source| Failure::Send {

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use drivers::transport::Histogram;
-use machine::{BusFigures, Machine, bus_figures, temperatures};
-use units::{Celsius, Time};
+use machine::{BusFigures, Machine, Thermometer, bus_figures, temperatures};
+use units::Time;
 
 const EVERY: Duration = Duration::from_secs(1);
 const WINDOW: Duration = Duration::from_secs(60);
@@ -19,8 +19,8 @@ pub struct Figures {
     pub buses: Vec<BusFigures>,
     /// The same of the last minute, in the same order.
     pub minute: Vec<Minute>,
-    /// The name of a module, the number of its sensor from 0 on, and what that said last.
-    pub temperatures: Vec<(String, usize, Celsius)>,
+    /// What thermometers said last.
+    pub temperatures: Vec<Thermometer>,
 }
 
 /// The last minute on a bus.
@@ -77,13 +77,9 @@ impl Book {
         let buses = after.iter().zip(before);
         let of = |(after, before): (&BusFigures, &BusFigures)| {
             let busy = after.busy.saturating_sub(before.busy).as_secs_f64();
-            let lateness = after.sync.as_ref().map(|after| {
-                // A machine that was started anew has a new thread, which counts from nothing.
-                let before = before.sync.as_ref().filter(|it| it.sent <= after.sent);
-                match before {
-                    Some(before) => after.lateness.since(&before.lateness),
-                    None => after.lateness.clone(),
-                }
+            let lateness = after.sync.as_ref().map(|after| match &before.sync {
+                Some(before) => after.lateness.since(&before.lateness),
+                None => after.lateness.clone(),
             });
             Minute {
                 lateness,
@@ -137,10 +133,5 @@ mod tests {
             "{lateness}"
         );
         assert!(book.taken.len() <= 61, "{}", book.taken.len());
-        // A thread that was started anew.
-        let mut anew = Histogram::default();
-        anew.note(Duration::from_micros(7));
-        book.take(Time::from_seconds(200.0), bus(busy_ms, &anew));
-        assert_eq!(book.minute()[0].lateness, Some(anew));
     }
 }

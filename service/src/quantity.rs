@@ -60,6 +60,11 @@ impl Quantity {
         text::length(&self.text())
     }
 
+    /// The angle that it is; `None` when it is none.
+    pub fn angle(&self) -> Option<Radians> {
+        text::angle(&self.text())
+    }
+
     fn text(&self) -> String {
         format!("{}{}", self.value, self.unit)
     }

@@ -5,6 +5,7 @@ mod contract;
 mod edge;
 mod flood;
 mod http;
+mod metrics;
 mod network;
 mod stage;
 mod strangers;

@@ -30,6 +30,7 @@ const CLASSES: usize = (STEPS * (DOUBLINGS + 1)) as usize;
 pub struct Histogram {
     counts: [u64; CLASSES],
     total: u64,
+    sum: Duration,
     greatest: Duration,
 }
 
@@ -38,6 +39,7 @@ impl Default for Histogram {
         Self {
             counts: [0; CLASSES],
             total: 0,
+            sum: Duration::ZERO,
             greatest: Duration::ZERO,
         }
     }
@@ -69,6 +71,7 @@ impl Histogram {
         let micros = u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
         self.counts[class(micros)] += 1;
         self.total += 1;
+        self.sum = self.sum.saturating_add(time);
         self.greatest = self.greatest.max(time);
     }
 
@@ -78,6 +81,7 @@ impl Histogram {
             *count += more;
         }
         self.total += other.total;
+        self.sum = self.sum.saturating_add(other.sum);
         self.greatest = self.greatest.max(other.greatest);
     }
 
@@ -89,6 +93,7 @@ impl Histogram {
             *count = count.saturating_sub(*before);
         }
         since.total = self.total.saturating_sub(earlier.total);
+        since.sum = self.sum.saturating_sub(earlier.sum);
         let last = since.counts.iter().rposition(|it| *it > 0);
         let greatest = last.map_or(Duration::ZERO, |it| Duration::from_micros(end(it)));
         since.greatest = greatest.min(self.greatest);
@@ -98,6 +103,11 @@ impl Histogram {
     /// How many were noted.
     pub const fn total(&self) -> u64 {
         self.total
+    }
+
+    /// All of them together.
+    pub const fn sum(&self) -> Duration {
+        self.sum
     }
 
     /// The greatest one.
@@ -171,6 +181,9 @@ mod tests {
         sum.note(Duration::from_micros(7));
         sum.add(&histogram);
         assert_eq!((sum.total(), sum.greatest()), (102, histogram.greatest()));
+        let micros = 100 * 101 / 2 + 7;
+        let expected = Duration::from_secs(3_600) + Duration::from_micros(micros);
+        assert_eq!(sum.sum(), expected);
         assert_eq!(sum.percentile(0.07), Duration::from_micros(8));
         assert!(histogram.to_string().starts_with("p50 52 us, p99 "));
     }
@@ -185,7 +198,7 @@ mod tests {
             late.note(Duration::from_micros(micros));
         }
         let since = all.since(&earlier);
-        assert_eq!(since.total(), 4);
+        assert_eq!((since.total(), since.sum()), (4, late.sum()));
         for share in [0.25, 0.75] {
             assert_eq!(since.percentile(share), late.percentile(share));
         }

@@ -32,3 +32,13 @@ pub struct SyncStatistics {
     /// How the thread is scheduled.
     pub scheduling: Scheduling,
 }
+
+impl SyncStatistics {
+    /// Takes over what another producer has done; how it was scheduled is no sum.
+    pub fn add(&mut self, other: &Self) {
+        self.sent += other.sent;
+        self.skipped += other.skipped;
+        self.refused += other.refused;
+        self.lateness.add(&other.lateness);
+    }
+}

@@ -340,6 +340,7 @@ impl Run<'_> {
             pace.deadline = now;
             timing.shifted += 1;
         }
+        self.account(late, missed);
         self.send_syncs()
             .map_err(|source| self.not_sent(source, "SYNC"))?;
         if let Some(before) = pace.synced {
@@ -352,6 +353,17 @@ impl Run<'_> {
         }
         pace.held_up = Some((now, missed));
         Ok(missed)
+    }
+
+    /// A SYNC that leaves now is among those that the machine's buses are judged by.
+    fn account(&mut self, late: Duration, missed: u32) {
+        for port in self.seats.buses.iter() {
+            if let Some(syncs) = self.machine.ports.syncs.of_engine(*port) {
+                syncs.lateness.note(late);
+                syncs.sent += 1;
+                syncs.skipped += u64::from(missed);
+            }
+        }
     }
 
     fn send_syncs(&mut self) -> Result<(), SendError> {

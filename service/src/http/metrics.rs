@@ -9,8 +9,9 @@ use drivers::transport::SyncStatistics;
 use machine::BusFigures;
 
 use super::state::State as Shared;
+use crate::desk::Desk;
 use crate::figures::Figures;
-use crate::view::MachineState;
+use crate::view::{AxisView, MachineState};
 
 /// Figures of the machine.
 #[utoipa::path(
@@ -22,67 +23,85 @@ pub(super) async fn metrics(State(shared): State<Shared>) -> impl IntoResponse {
     (kind, text(&shared.desk))
 }
 
-fn text(desk: &crate::desk::Desk) -> String {
+fn text(desk: &Desk) -> String {
+    let figures = desk.figures();
     let mut text = String::new();
-    let machine = desk.machine();
-    let running = u8::from(machine.state == MachineState::Running);
-    let ticks = desk.snapshot().ticks;
-    // To write into a text cannot fail.
-    let _ = write!(
-        text,
-        "# HELP truestage_running Whether the machine is supervised and carries orders out.\n\
-         # TYPE truestage_running gauge\ntruestage_running {running}\n\
-         # HELP truestage_clock_seconds The machine's clock.\n\
-         # TYPE truestage_clock_seconds counter\ntruestage_clock_seconds {}\n\
-         # HELP truestage_ticks_total Ticks of the machine's loop.\n\
-         # TYPE truestage_ticks_total counter\ntruestage_ticks_total {ticks}\n\
-         # HELP truestage_events_total Events.\n\
-         # TYPE truestage_events_total counter\ntruestage_events_total {}\n",
-        machine.clock_s, machine.newest_event
-    );
-    axes(&mut text, desk);
-    text += &of_figures(&desk.figures());
-    text += "# HELP truestage_device_events_total What each device counted.\n\
-             # TYPE truestage_device_events_total counter\n";
-    for (device, what, count) in desk.counters() {
-        let (device, what) = (label(&device), label(what));
-        let _ = writeln!(
-            text,
-            "truestage_device_events_total{{device=\"{device}\",what=\"{what}\"}} {count}"
-        );
+    for figure in machine_figures(desk)
+        .into_iter()
+        .chain(axis_figures(desk))
+        .chain(sync_figures(&figures))
+        .chain(bus_figures(&figures))
+        .chain([device_figure(desk)])
+    {
+        write(&mut text, figure);
     }
     text
 }
 
-/// A figure's name, what it is, its kind, and each of its labels with a value.
+/// A figure's name, what it is, its kind, and its samples: the rest of the name and labels, with a value.
 type Figure = (&'static str, &'static str, &'static str, Vec<(String, f64)>);
 
-/// Of the buses, and of what is measured around them.
-fn of_figures(figures: &Figures) -> String {
-    let list = sync_figures(figures).into_iter();
-    let mut text = String::new();
-    for (name, what, kind, values) in list.chain(bus_figures(figures)) {
-        if !values.is_empty() {
-            // To write into a text cannot fail.
-            let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {kind}");
-        }
-        for (labels, value) in values {
-            let _ = writeln!(text, "{name}{{{labels}}} {value}");
-        }
+/// What has no value is left out.
+fn write(text: &mut String, (name, what, kind, samples): Figure) {
+    if !samples.is_empty() {
+        // To write into a text cannot fail.
+        let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} {kind}");
     }
-    text
+    for (rest, value) in samples {
+        let _ = writeln!(text, "{name}{rest} {value}");
+    }
 }
 
-/// Of SYNCs that a thread sends: in simulated time, and while the cyclic engine sends them, there are none.
-fn sync_figures(figures: &Figures) -> [Figure; 4] {
-    let minutes = figures.buses.iter().zip(&figures.minute);
-    let lateness = minutes.filter_map(|(bus, it)| Some((label(&bus.name), it.lateness.as_ref()?)));
-    let quantiles = lateness.flat_map(|(bus, lateness)| {
-        [0.5, 0.99, 1.0].map(|share| {
-            let labels = format!("bus=\"{bus}\",quantile=\"{share}\"");
-            (labels, lateness.percentile(share).as_secs_f64())
-        })
+fn machine_figures(desk: &Desk) -> [Figure; 4] {
+    let machine = desk.machine();
+    let only = |value: f64| vec![(String::new(), value)];
+    let is_running = machine.state == MachineState::Running;
+    [
+        (
+            "truestage_running",
+            "Whether the machine is supervised and carries orders out.",
+            "gauge",
+            only(f64::from(u8::from(is_running))),
+        ),
+        (
+            "truestage_clock_seconds",
+            "The machine's clock.",
+            "gauge",
+            only(machine.clock_s),
+        ),
+        (
+            "truestage_ticks_total",
+            "Ticks of the machine's loop.",
+            "counter",
+            only(desk.snapshot().ticks as f64),
+        ),
+        (
+            "truestage_events_total",
+            "Events.",
+            "counter",
+            only(machine.newest_event as f64),
+        ),
+    ]
+}
+
+/// What each device counted.
+fn device_figure(desk: &Desk) -> Figure {
+    let counters = desk.counters();
+    let counts = counters.iter().map(|(device, what, count)| {
+        let (device, what) = (label(device), label(what));
+        let labels = format!("{{device=\"{device}\",what=\"{what}\"}}");
+        (labels, *count as f64)
     });
+    (
+        "truestage_device_events_total",
+        "What each device counted.",
+        "counter",
+        counts.collect(),
+    )
+}
+
+/// Of SYNCs that leave in real time: in simulated time there are none.
+fn sync_figures(figures: &Figures) -> [Figure; 4] {
     let of = |count: fn(&SyncStatistics) -> u64| {
         let buses = figures.buses.iter();
         let known =
@@ -92,9 +111,9 @@ fn sync_figures(figures: &Figures) -> [Figure; 4] {
     [
         (
             "truestage_sync_lateness_seconds",
-            "How late SYNCs left in the last minute: half of them, 99 %, all.",
-            "gauge",
-            quantiles.collect(),
+            "How late SYNCs left: in the last minute half of them, 99 %, all; sum and count since the service began.",
+            "summary",
+            lateness_samples(figures),
         ),
         (
             "truestage_syncs_total",
@@ -104,7 +123,7 @@ fn sync_figures(figures: &Figures) -> [Figure; 4] {
         ),
         (
             "truestage_sync_overruns_total",
-            "SYNCs left out, because they would have been more than half a period late.",
+            "SYNCs left out, because they would have been too late.",
             "counter",
             of(|it| it.skipped),
         ),
@@ -117,8 +136,33 @@ fn sync_figures(figures: &Figures) -> [Figure; 4] {
     ]
 }
 
+/// A summary of each bus.
+fn lateness_samples(figures: &Figures) -> Vec<(String, f64)> {
+    let buses = figures.buses.iter().zip(&figures.minute);
+    let known = buses.filter_map(|(bus, minute)| {
+        let all = &bus.sync.as_ref()?.lateness;
+        let minute = minute.lateness.as_ref()?;
+        let name = label(&bus.name);
+        let quantile = |share: f64| match minute.total() {
+            // Prometheus' word for a quantile of nothing.
+            0 => f64::NAN,
+            _ => minute.percentile(share).as_secs_f64(),
+        };
+        let quantiles = [0.5, 0.99, 1.0].map(|share| {
+            let rest = format!("{{bus=\"{name}\",quantile=\"{share}\"}}");
+            (rest, quantile(share))
+        });
+        let totals = [
+            (format!("_sum{{bus=\"{name}\"}}"), all.sum().as_secs_f64()),
+            (format!("_count{{bus=\"{name}\"}}"), all.total() as f64),
+        ];
+        Some(quantiles.into_iter().chain(totals))
+    });
+    known.flatten().collect()
+}
+
 fn bus_label(bus: &BusFigures) -> String {
-    format!("bus=\"{}\"", label(&bus.name))
+    format!("{{bus=\"{}\"}}", label(&bus.name))
 }
 
 fn bus_figures(figures: &Figures) -> [Figure; 6] {
@@ -132,7 +176,8 @@ fn bus_figures(figures: &Figures) -> [Figure; 6] {
         .temperatures
         .iter()
         .map(|(module, sensor, celsius)| {
-            let labels = format!("module=\"{}\",sensor=\"{sensor}\"", label(module));
+            let (module, sensor) = (label(module), label(sensor));
+            let labels = format!("{{module=\"{module}\",sensor=\"{sensor}\"}}");
             (labels, celsius.value())
         });
     [
@@ -168,53 +213,55 @@ fn bus_figures(figures: &Figures) -> [Figure; 6] {
         ),
         (
             "truestage_temperature_celsius",
-            "What thermometers said last, by the number of the sensor from 0 on.",
+            "What thermometers of modules and instruments said last.",
             "gauge",
             temperatures.collect(),
         ),
     ]
 }
 
-fn axes(text: &mut String, desk: &crate::desk::Desk) {
+fn axis_figures(desk: &Desk) -> [Figure; 4] {
     let axes = desk.axes();
-    *text += "# HELP truestage_axis_homed Whether the axis has its zero.\n\
-              # TYPE truestage_axis_homed gauge\n";
-    for axis in &axes {
-        let (name, homed) = (label(&axis.name), u8::from(axis.homed));
-        let _ = writeln!(text, "truestage_axis_homed{{axis=\"{name}\"}} {homed}");
-    }
-    *text += "# HELP truestage_calibration_created_timestamp_seconds When the calibration in use was made.\n\
-              # TYPE truestage_calibration_created_timestamp_seconds gauge\n";
-    for axis in &axes {
-        let created = axis.calibration_created.as_deref();
-        let created = created.and_then(|it| it.parse::<jiff::Timestamp>().ok());
-        if let Some(created) = created {
-            let (name, seconds) = (label(&axis.name), created.as_second());
-            let _ = writeln!(
-                text,
-                "truestage_calibration_created_timestamp_seconds{{axis=\"{name}\"}} {seconds}"
-            );
-        }
-    }
-    *text += "# HELP truestage_axis_position_metres Where its point stands.\n\
-              # TYPE truestage_axis_position_metres gauge\n";
-    for axis in &axes {
-        let position = axis.position.as_ref().and_then(|it| it.length());
-        if let Some(position) = position {
-            let (name, metres) = (label(&axis.name), position.value());
-            let _ = writeln!(
-                text,
-                "truestage_axis_position_metres{{axis=\"{name}\"}} {metres}"
-            );
-        }
-    }
+    let of = |value: fn(&AxisView) -> Option<f64>| {
+        let labels = |axis: &AxisView| format!("{{axis=\"{}\"}}", label(&axis.name));
+        let known = axes.iter().filter_map(|it| Some((labels(it), value(it)?)));
+        known.collect()
+    };
+    [
+        (
+            "truestage_axis_homed",
+            "Whether the axis has its zero.",
+            "gauge",
+            of(|it| Some(f64::from(u8::from(it.homed)))),
+        ),
+        (
+            "truestage_calibration_created_timestamp_seconds",
+            "When the calibration in use was made.",
+            "gauge",
+            of(|it| {
+                let created = it.calibration_created.as_deref()?;
+                let created = created.parse::<jiff::Timestamp>().ok()?;
+                Some(created.as_second() as f64)
+            }),
+        ),
+        (
+            "truestage_axis_position_metres",
+            "Where its point stands along its way.",
+            "gauge",
+            of(|it| Some(it.position.as_ref()?.length()?.value())),
+        ),
+        (
+            "truestage_axis_position_radians",
+            "Where it stands round its turn, counted on over the turns.",
+            "gauge",
+            of(|it| Some(it.position.as_ref()?.angle()?.value())),
+        ),
+    ]
 }
 
 /// A label's value: nothing in it ends it.
 fn label(text: &str) -> String {
-    let escaped = text.chars().map(|it| match it {
-        '\\' | '"' | '\n' => '_',
-        other => other,
-    });
-    escaped.collect()
+    text.replace('\\', "\\\\")
+        .replace('"', "\\\"")
+        .replace('\n', "\\n")
 }
