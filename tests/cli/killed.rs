@@ -1,5 +1,5 @@
 //! `kill -9` of a service that moves a stage: at whatever moment, the drive stops in time by itself, and the next service
-//! goes on from there.
+//! goes on from there, with the run that was under way.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use drivers::transport::live::Live;
 use drivers::transport::lockstep::lend_hand;
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
-use tests::{Edit, Rig};
+use tests::{Edit, Rig, random};
 
 use crate::programs::{Bench, Process, live_rigs, number};
 use crate::serve::{ask, keep};
@@ -115,4 +115,146 @@ fn the_drive_of_a_service_that_is_killed_stops_in_time_and_the_next_service_goes
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }
+}
+
+/// So fast the axis goes from one position of a calibration to the next, which is nearly all of the time.
+const SLOWLY_MM_PER_S: f64 = 1.0;
+/// A kill comes so long after the run was begun at most, in seconds of the machine.
+const WITHIN_S: f64 = 8.0;
+/// What the stage must have gone in a hundredth of a second to be in motion.
+const IN_MOTION_MM: f64 = 0.004;
+
+/// A machine whose calibrations take minutes.
+fn slow_bench(rig: Rig) -> Bench {
+    let bench = Bench::new(rig);
+    bench.configure("machine.toml", |text| {
+        text.edit("speed_mm_per_s = 200.0", "speed_mm_per_s = 1.0")
+            .edit("move_timeout_s = 10.0", "move_timeout_s = 100000.0")
+    });
+    bench
+}
+
+/// The runs that the service at `bench` knows.
+fn runs(bench: &Bench) -> Vec<Value> {
+    let (status, runs) = ask(bench.folder(), "GET /v1/runs", &json!({}));
+    assert_eq!(status, 200, "{runs}");
+    runs.as_array().expect("a list").clone()
+}
+
+/// The one run that was left; it can go on.
+#[track_caller]
+fn found(bench: &Bench, instant: u32) -> Value {
+    let all = runs(bench);
+    let [run] = &all[..] else {
+        panic!("instant {instant}: one run was under way, the service found {all:?}");
+    };
+    assert_eq!(
+        (&run["kind"], &run["state"], &run["can_resume"]),
+        (&json!("calibrate"), &json!("paused"), &json!(true)),
+        "instant {instant}: {run}"
+    );
+    run.clone()
+}
+
+/// Begins a calibration, or lets `left` go on, and kills the service in a motion of it.
+fn killed_in_a_run(bench: &Bench, service: Process, left: Option<&Value>, state: &mut u64) {
+    bench.run(&["zero", "machine.toml"]).with_code(0);
+    let begun = match left {
+        None => ask(
+            bench.folder(),
+            "POST /v1/runs",
+            &json!({"kind": "calibrate", "start": true}),
+        ),
+        Some(run) => {
+            let id = run["id"].as_str().expect("it has a name");
+            let resume = format!("POST /v1/runs/{id}/resume");
+            ask(bench.folder(), &resume, &json!({}))
+        }
+    };
+    assert!(begun.0 < 300, "{begun:?}");
+    let mut watcher = Watcher::of(bench);
+    let is_moving = |_: &u32| {
+        watcher.wait(Duration::from_secs_f64(random(state) * WITHIN_S));
+        let before = watcher.true_mm();
+        watcher.wait(Duration::from_millis(10));
+        (watcher.true_mm() - before).abs() > IN_MOTION_MM
+    };
+    let moving = (0..10).find(is_moving);
+    assert!(moving.is_some(), "it does not move: {:?}", runs(bench));
+    // It goes on by itself until the signal is there: whatever it does just then.
+    drop(watcher);
+    service.signal(Signal::SIGKILL);
+    assert_eq!(service.end().code, None);
+}
+
+/// How far the stage went on; it must stand in time.
+fn stopped(bench: &Bench, instant: u32) -> f64 {
+    let mut watcher = Watcher::of(bench);
+    let killed_at = watcher.true_mm();
+    watcher.wait(STOPPED_WITHIN);
+    let stopped_at = watcher.true_mm();
+    watcher.wait(Duration::from_secs(3));
+    let later = watcher.true_mm();
+    assert!(
+        (later - stopped_at).abs() < STANDS_MM,
+        "instant {instant}: killed at {killed_at} mm, it was at {stopped_at} mm when it should stand and went on to \
+         {later} mm"
+    );
+    let went_on = (stopped_at - killed_at).abs();
+    let farthest = STOPPED_WITHIN.as_secs_f64() * SLOWLY_MM_PER_S;
+    assert!(
+        went_on < farthest,
+        "instant {instant}: it went on by {went_on} mm"
+    );
+    went_on
+}
+
+#[test]
+fn the_run_of_a_service_that_is_killed_in_motion_is_found_each_time_and_goes_on() {
+    for rig in live_rigs() {
+        let bench = slow_bench(rig);
+        let (mut state, mut left) = (u64::from(std::process::id()), None::<Value>);
+        println!("seed {state}");
+        let (mut farthest, mut resumed) = (0.0_f64, 0);
+        let mut service = keep(&bench);
+        for instant in 0..instants(rig) {
+            // One that was found goes on or is begun anew.
+            let goes_on = left.take().filter(|_| random(&mut state) < 0.5);
+            resumed += u32::from(goes_on.is_some());
+            killed_in_a_run(&bench, service, goes_on.as_ref(), &mut state);
+            farthest = farthest.max(stopped(&bench, instant));
+            service = keep(&bench);
+            let run = found(&bench, instant);
+            if let Some(before) = &goes_on {
+                assert_eq!(run["journal"], before["journal"], "instant {instant}");
+            }
+            left = Some(run);
+        }
+        println!(
+            "{rig:?}: killed at {} instants in motion, {resumed} of them in a run that went on; the run was found each \
+             time, and no stage went on by more than {farthest:.3} mm at {SLOWLY_MM_PER_S} mm/s",
+            instants(rig)
+        );
+        goes_on_to_its_end(&bench, &left.expect("there was an instant"));
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+/// The last one that was found becomes a calibration.
+fn goes_on_to_its_end(bench: &Bench, left: &Value) {
+    bench.run(&["zero", "machine.toml"]).with_code(0);
+    let id = left["id"].as_str().expect("it has a name");
+    let (status, run) = ask(
+        bench.folder(),
+        &format!("POST /v1/runs/{id}/resume"),
+        &json!({}),
+    );
+    assert_eq!(status, 200, "{run}");
+    let wait = format!("GET /v1/runs/{id}?wait_s=300");
+    let mut waits = (0..100).map(|_| ask(bench.folder(), &wait, &json!({})).1);
+    let ended = waits.find(|it| it["state"] != "running");
+    let ended = ended.expect("it comes to an end");
+    assert_eq!(ended["state"], "done", "{ended}");
+    assert_eq!(ended["result"]["journal"], left["journal"], "{ended}");
 }
