@@ -56,3 +56,42 @@ fn strangers_find_no_fault_with_the_interface_and_move_nothing_past_a_limit() {
         "{report}"
     );
 }
+
+#[test]
+fn the_library_of_prometheus_reads_what_a_machine_in_real_time_says() {
+    if !rigs().contains(&Rig::Pty) {
+        return;
+    }
+    if !can_import("prometheus_client") {
+        let why = "prometheus_client is not installed: run tests/run";
+        return tests::not_run("the reader of metrics", why);
+    }
+    let programs = programs();
+    let words = [&*programs.to_string_lossy()];
+    let metrics = Peer::start("metrics_judge.py", &words).finish();
+    // It leaves `_total` out of a counter's name.
+    for (name, kind, samples) in [
+        ("sync_lateness_seconds", "summary", 5),
+        ("syncs", "counter", 1),
+        ("sync_overruns", "counter", 1),
+        ("bus_load_ratio", "gauge", 1),
+        ("bus_errors", "counter", 1),
+        ("running", "gauge", 1),
+    ] {
+        let metric = &metrics[format!("truestage_{name}")];
+        assert_eq!(metric["kind"], kind, "{name}: {metrics}");
+        let said = metric["samples"].as_array().map_or(0, Vec::len);
+        assert_eq!(said, samples, "{name}: {metric}");
+        assert!(metric["what"].as_str().is_some_and(|it| !it.is_empty()));
+    }
+    let lateness = &metrics["truestage_sync_lateness_seconds"]["samples"];
+    let named = |name: &str| {
+        let samples = lateness.as_array().expect("a list").iter();
+        let name = format!("truestage_sync_lateness_seconds{name}");
+        let found = samples.filter(|it| it[0] == name.as_str());
+        found.filter_map(|it| it[2].as_f64()).collect::<Vec<_>>()
+    };
+    let (quantiles, counts) = (named(""), named("_count"));
+    assert!(quantiles.len() == 3 && quantiles.is_sorted(), "{lateness}");
+    assert!(counts[0] > 100.0 && named("_sum")[0] > 0.0, "{lateness}");
+}

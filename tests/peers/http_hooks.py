@@ -18,7 +18,11 @@ import schemathesis
 from kept_machine import Truth
 
 TASK = json.loads(os.environ["TRUESTAGE_JUDGED"])
-LOW, HIGH = TASK["soft_mm"]
+# Soft limits by axis, in millimetres, and what motions can name.
+LIMITS, TARGETS = TASK["limits_mm"], TASK["targets"]
+AXES = list(TASK["axes"])
+# What its truth is called, where it is that of one axis.
+TRUE_AXIS = TASK["true_axis"]
 # As long as a request is held back for an end, by the computer's clock.
 WAIT_MAX_S = 0.3
 # What the set-point may differ from a limit by in printing.
@@ -51,16 +55,19 @@ class Watch:
 
     def look(self):
         """Where the stage truly is. A zero looks for the limit switch, which lies beyond, and may be stopped there."""
+        if not TRUE_AXIS:
+            return
         mm = self.truth.position_mm()
-        with urllib.request.urlopen(f"{TASK['url']}/v1/axes/x", timeout=30) as answer:
+        with urllib.request.urlopen(f"{TASK['url']}/v1/axes/{TRUE_AXIS}", timeout=30) as answer:
             axis = json.load(answer)
         if axis["homed"] and axis["state"] != "Homing":
-            self.within("truth", mm, TRUE_MM)
+            self.within("truth", TRUE_AXIS, mm, TRUE_MM)
 
-    def within(self, what, mm, more):
+    def within(self, what, axis, mm, more):
         """It is not beyond a soft limit by more than that."""
-        if not LOW - more <= mm <= HIGH + more:
-            self.beyond.append([what, mm])
+        low, high = LIMITS[axis]
+        if not low - more <= mm <= high + more:
+            self.beyond.append([what, axis, mm])
 
     def learn(self, value):
         """Names and set-points of an answer."""
@@ -70,14 +77,17 @@ class Watch:
         if not isinstance(value, dict):
             return
         point = value.get("set_point")
-        if isinstance(point, dict):
-            self.within("set_point", point["value"], PRINTED_MM)
+        if isinstance(point, dict) and value.get("name") in LIMITS and point["unit"] == "mm":
+            self.within("set_point", value["name"], point["value"], PRINTED_MM)
         if value.get("state") in ("done", "stopped", "failed", "timed_out") and "id" in value:
             self.ends[value["id"]] = value["state"]
             if value["state"] == "failed":
                 self.causes[value["id"]] = value["cause"]["cause"]
-        for each in value.values():
-            self.learn(each)
+        for name, each in value.items():
+            if name in LIMITS and isinstance(each, dict):
+                self.learn({"name": name, **each})
+            else:
+                self.learn(each)
 
     def name(self, path, value):
         """Keeps what can be asked for again."""
@@ -100,6 +110,14 @@ WATCH = Watch()
 atexit.register(WATCH.report)
 
 
+def drawn_targets():
+    """One of what motions can name here, to within a little more than its travel."""
+    name = WATCH.random.choice(list(TARGETS))
+    unit, low, high = TARGETS[name]
+    value = WATCH.random.uniform(low - 1, high + 1)
+    return {name: WATCH.random.choice([f"{value:.6f}{unit}", {"value": value, "unit": unit}])}
+
+
 def meant(case):
     """A valid request becomes one that means something."""
     for kind in NAMES:
@@ -107,14 +125,13 @@ def meant(case):
         if f"/{kind}/{{id}}" in case.path and names:
             case.path_parameters["id"] = WATCH.random.choice(names[-5:])
     if "{axis}" in case.path:
-        case.path_parameters["axis"] = "x"
+        case.path_parameters["axis"] = WATCH.random.choice(AXES)
     if not isinstance(case.body, dict):
         return
     if case.body.get("axis") is not None:
-        case.body["axis"] = "x"
+        case.body["axis"] = WATCH.random.choice(AXES)
     if "targets" in case.body:
-        mm = WATCH.random.uniform(LOW - 1, HIGH + 1)
-        case.body["targets"] = {"x": WATCH.random.choice([f"{mm:.6f}mm", {"value": mm, "unit": "mm"}])}
+        case.body["targets"] = drawn_targets()
         # Nothing corrects the axis, and most strangers are to get it moving.
         case.body["uncompensated"] = WATCH.random.random() < 0.9
         case.body["dead_man_ms"] = WATCH.random.choice([None, case.body.get("dead_man_ms")])

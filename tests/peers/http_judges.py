@@ -1,6 +1,6 @@
-"""Strangers judge the HTTP interface of `truestage serve` on an emulated linear machine.
+"""Strangers judge the HTTP interface of `truestage serve` on an emulated machine.
 
-    http_judges.py PROGRAMS [--requests N] [--seed N]
+    http_judges.py PROGRAMS [--machine NAME] [--requests N] [--seed N]
 
 PROGRAMS is the folder with `truestage` and `mock-bus`. A client that openapi-python-client generates of
 /openapi.json runs the cycle of the README; then schemathesis asks what its seeds draw, until it was at least N
@@ -54,7 +54,9 @@ def asked_by_schemathesis(kept, requests, seed):
     """One run of it: how many answers of which status, and what it found."""
     report = kept.path / "judged.json"
     report.unlink(missing_ok=True)
-    task = {"seed": seed, "soft_mm": kept.soft_mm, "url": kept.url, "clock": str(kept.clock), "report": str(report)}
+    task = {"seed": seed, "limits_mm": kept.limits_mm, "targets": kept.targets(), "url": kept.url}
+    task |= {"axes": [it["name"] for it in kept.ask("GET", "/v1/axes")], "clock": str(kept.clock), "report": str(report)}
+    task["true_axis"] = "x" if kept.machine == "linear" else None
     there = os.environ | {
         "TRUESTAGE_JUDGED": json.dumps(task),
         "SCHEMATHESIS_HOOKS": "http_hooks",
@@ -104,14 +106,25 @@ def judge(kept, requests, first_seed):
     return total
 
 
+def zeroed(kept):
+    """Every axis has its zero."""
+    run = kept.ask("POST", "/v1/runs", {"kind": "zero", "start": True})
+    while run["state"] == "running":
+        run = kept.ask("GET", f"/v1/runs/{run['id']}?wait_s=30")
+    if run["state"] != "done":
+        raise RuntimeError(f"zero: expected that it is done, seen: {run}")
+
+
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("programs", help="the folder with truestage and mock-bus")
     words.add_argument("--requests", type=int, default=500, help="at least so many by schemathesis")
     words.add_argument("--seed", type=int, default=1, help="the first of its seeds")
+    words.add_argument("--machine", default="linear", help="one of configs/machines")
     words = words.parse_args()
-    with KeptMachine(words.programs) as kept:
-        cycle = run_cycle(generated(kept), kept.url)
+    with KeptMachine(words.programs, words.machine) as kept:
+        # The README's cycle is that of a linear stage; others find their zero, so that they can move.
+        cycle = run_cycle(generated(kept), kept.url) if words.machine == "linear" else zeroed(kept)
         report = judge(kept, words.requests, words.seed)
         report["alive"] = kept.ask("GET", "/healthz")["state"]
         report["ended_well"] = kept.end()

@@ -1,6 +1,6 @@
-"""An emulated linear machine in lockstep, kept by `truestage serve` at a port of this computer.
+"""An emulated machine in lockstep, or in real time, kept by `truestage serve` at a port of this computer.
 
-`with KeptMachine(programs, seed) as kept:`; all files are in a temporary folder. What was sent on the buses is
+`with KeptMachine(programs, machine, seed) as kept:`; all files are in a temporary folder. What was sent on the buses is
 recorded, so that afterwards each set-point can be judged, whatever the service said of it.
 """
 
@@ -10,6 +10,7 @@ import socket
 import subprocess
 import tempfile
 import time
+import tomllib
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -18,35 +19,36 @@ CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 # How long anything is waited for; only a broken run takes so long.
 PATIENCE_S = 60.0
 # What is written to the drive's mode of operation (0x6060): 1 goes to set-points, 6 looks for the limit switch.
-# And its RPDO: control word, then a position in counts of 10 nm, which counts as soon as bit 4 of the word is set.
-SENT = re.compile(rb" can0 (?:601#2F606000(..)|201#(..)..(.{8}))[0-9A-F]* T$", re.MULTILINE)
+# And its RPDO: control word, then a position in counts, which counts as soon as bit 4 of the word is set.
+SENT = re.compile(rb" can0 (?:60(.)#2F606000(..)|20(.)#(..)..(.{8}))[0-9A-F]* T$", re.MULTILINE)
 TO_SET_POINTS = 1
 NEW_SET_POINT = 1 << 4
-COUNTS_PER_MM = 100_000
-# The zero that the Hall sensors find is this far from the drive's own at most.
+# A zero that is found is this far from the drive's own at most.
 ORIGIN_MM = 0.2
 PIECE = 1 << 24
 # Fewer measurements than the shipped ones: they are not what is judged.
 SHORTER = (("runs = 3", "runs = 2"), ("targets = 8\nruns = 5", "targets = 4\nruns = 2"))
 # By the computer's clock a request is late that is not by the machine's, whose clock runs ahead.
-PATIENT = (("move_timeout_s = 10.0", "move_timeout_s = 100000.0"),)
+PATIENT = (re.compile(r"move_timeout_s = [0-9.]+"), "move_timeout_s = 100000.0")
 
 
-def edited(text, changes):
-    """The text with each change made; one that finds nothing would prove nothing."""
-    for old, new in changes:
+def edited(text, machine):
+    """The configuration of a machine as it is kept; a change that finds nothing would prove nothing."""
+    for old, new in SHORTER if machine == "linear" else ():
         if old not in text:
-            raise RuntimeError(f"configs/machines/linear.toml: expected `{old}`, it is not there")
+            raise RuntimeError(f"configs/machines/{machine}.toml: expected `{old}`, it is not there")
         text = text.replace(old, new)
-    return text
+    return PATIENT[0].sub(PATIENT[1], text)
 
 
 class KeptMachine:
     """Two processes and their folder."""
 
-    def __init__(self, programs, seed=51):
+    def __init__(self, programs, machine="linear", seed=51, is_real_time=False):
         self.programs = Path(programs).resolve()
+        self.machine = machine
         self.seed = seed
+        self.is_real_time = is_real_time
         self.processes = []
 
     def __enter__(self):
@@ -55,7 +57,7 @@ class KeptMachine:
         try:
             ports = self._emulate()
             self._serve(ports)
-            self.soft_mm = self._soft_limits()
+            self.limits_mm = self._soft_limits()
         except BaseException:
             self.__exit__()
             raise
@@ -94,27 +96,44 @@ class KeptMachine:
         except urllib.error.HTTPError as error:
             raise RuntimeError(f"{method} {path}: {error.code}: {error.read()!r}") from error
 
+    def text(self, path):
+        """What is there, as it is."""
+        with urllib.request.urlopen(self.url + path, timeout=PATIENCE_S) as answer:
+            return answer.read().decode()
+
     def set_points(self):
-        """How many set-points the drive was sent, and how far they lie beyond the soft limits, in millimetres."""
+        """How many set-points drives were sent, and how far they lie beyond the soft limits, in millimetres."""
         count, beyond = 0, 0.0
-        low, high = self.soft_mm
-        for counts in recorded(self.path / "recording.log"):
+        nodes = self._nodes()
+        for node, counts in recorded(self.path / "recording.log"):
             count += 1
-            mm = counts / COUNTS_PER_MM
-            beyond = max(beyond, low - mm, mm - high)
+            if node in nodes:
+                (low, high), counts_per_mm = nodes[node]
+                mm = counts / counts_per_mm
+                beyond = max(beyond, low - mm, mm - high)
         return count, max(0.0, beyond - ORIGIN_MM)
 
+    def _nodes(self):
+        """Of each drive with soft limits: these, and its counts per millimetre, by its node."""
+        axes = tomllib.loads((self.path / "machine.toml").read_text()).get("axis", {})
+        on_can = {name: it for name, it in axes.items() if "node_id" in it and name in self.limits_mm}
+        return {it["node_id"]: (self.limits_mm[name], 1e6 / it["resolution_nm"]) for name, it in on_can.items()}
+
     def _emulate(self):
-        emulated = CONFIGS / "emulated" / "linear.toml"
-        words = ["--seed", str(self.seed), "--clock", "lockstep:clock", "--outlive", "--slcan", "can0"]
+        emulated = CONFIGS / "emulated" / f"{self.machine}.toml"
+        time = ["--speed", "1"] if self.is_real_time else ["--clock", "lockstep:clock", "--outlive"]
+        words = ["--seed", str(self.seed), *time]
+        words += ["--slcan", "can0"] if 'name = "can0"' in emulated.read_text() else []
         count = emulated.read_text().count("[[ports]]")
         named = dict(line.split(": ", 1) for line in self._start(count, "mock-bus", str(emulated), *words))
-        return {"can0": named["can0"].replace(" ", ":"), "laser": named["laser"]}
+        configured = (CONFIGS / "machines" / f"{self.machine}.toml").read_text()
+        known = {name: place for name, place in named.items() if f".{name}]" in configured}
+        return {name: place.replace(" ", ":") for name, place in known.items()}
 
     def _serve(self, ports):
-        text = (CONFIGS / "machines" / "linear.toml").read_text()
-        (self.path / "machine.toml").write_text(edited(text, SHORTER + PATIENT))
-        self.words = ["--clock", "lockstep:clock"]
+        text = (CONFIGS / "machines" / f"{self.machine}.toml").read_text()
+        (self.path / "machine.toml").write_text(edited(text, self.machine))
+        self.words = [] if self.is_real_time else ["--clock", "lockstep:clock"]
         for name, place in ports.items():
             self.words += ["--port", f"{name}={place}"]
         self._listen("tcp:127.0.0.1:0", "--record", "recording.log")
@@ -151,8 +170,20 @@ class KeptMachine:
         return lines
 
     def _soft_limits(self):
-        axis = self.ask("GET", "/v1/axes/x")
-        return axis["soft_min"]["value"], axis["soft_max"]["value"]
+        """Of each axis that has some, in millimetres."""
+        axes = [it for it in self.ask("GET", "/v1/axes") if it["soft_min"]]
+        return {it["name"]: (it["soft_min"]["value"], it["soft_max"]["value"]) for it in axes}
+
+    def targets(self):
+        """What a motion can name here: each with its unit, and from where to where it is worth trying."""
+        axes = {it["name"]: it for it in self.ask("GET", "/v1/axes")}
+        named = {}
+        for name, axis in axes.items():
+            named[name] = ("mm", *self.limits_mm[name]) if axis["soft_min"] else ("deg", -400.0, 400.0)
+        for group in self.ask("GET", "/v1/machine")["groups"]:
+            for name in group["targets"]:
+                named.setdefault(name, ("arcsec", -600.0, 600.0) if name == "theta" else ("mm", -4.0, 4.0))
+        return named
 
 
 class Truth:
@@ -174,15 +205,16 @@ class Truth:
 
 
 def recorded(path):
-    """Each set-point of a recording, in counts, as often as it was sent."""
-    rest, mode = b"", None
+    """Each set-point of a recording: for which node, in counts, as often as it was sent."""
+    rest, modes = b"", {}
     with path.open("rb") as file:
         while piece := file.read(PIECE):
             whole, end, rest = (rest + piece).rpartition(b"\n")
-            for now, word, counts in SENT.findall(whole + end):
-                mode = int(now, 16) if now else mode
-                if not now and mode == TO_SET_POINTS and int(word, 16) & NEW_SET_POINT:
-                    yield int.from_bytes(bytes.fromhex(counts.decode()), "little", signed=True)
+            for told, now, node, word, counts in SENT.findall(whole + end):
+                if told:
+                    modes[told] = int(now, 16)
+                elif modes.get(node) == TO_SET_POINTS and int(word, 16) & NEW_SET_POINT:
+                    yield int(node, 16), int.from_bytes(bytes.fromhex(counts.decode()), "little", signed=True)
 
 
 def wait_for(what, is_so):

@@ -206,8 +206,9 @@ fn speed_of(request: &MoveRequest) -> Result<Option<MetresPerSecond>, Problem> {
     match request.speed {
         // Written so that NaN is refused too.
         Some(speed) if speed.0.value() > 0.0 => Ok(Some(speed.0)),
+        // One that is written as a positive number may still be none in metres per second.
         Some(_) => Err(Problem::new(
-            Code::BadQuantity,
+            Code::NotOffered,
             "a speed that is not positive",
             "give a positive one, or leave it out for the usual speed",
         )),
