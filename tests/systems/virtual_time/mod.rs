@@ -22,6 +22,7 @@ mod rotary_uncertainty;
 mod serial_zero;
 mod survey;
 mod table_uncertainty;
+mod thermometer_share;
 mod volumetric;
 mod volumetric_cameras;
 mod volumetric_cause;
