@@ -101,6 +101,7 @@ pub mod for_tests {
     pub use crate::linear::settings::{compensation, harmless};
     pub use crate::linear::verify::Verified;
     pub use crate::linear::zero::Zeroed;
+    pub use crate::linear::zero_budget::{budget as zero_budget, record as zero_budget_record};
     pub use crate::platform::moves::PoseMoved;
     pub use crate::rotary::calibrate::RotaryCalibrated;
     pub use crate::rotary::settings::rotary_settings;

@@ -1,6 +1,7 @@
 //! GTC computes the same uncertainties, degrees of freedom and covariances from the same budgets.
 
 mod places;
+mod zero;
 
 use compensator::budget::{AxisBudget, Contribution, Correlation, Evaluation};
 use serde_json::{Value, json};

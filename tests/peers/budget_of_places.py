@@ -10,7 +10,7 @@ import math
 import sys
 
 import numpy
-from GTC import dof, multiple_ureal, uncertainty, ureal
+from GTC import dof, multiple_ureal, set_correlation, type_b, uncertainty, ureal, value
 from scipy import stats
 
 
@@ -90,9 +90,43 @@ def of_tool(task):
     return lengths
 
 
+def of_zero(task):
+    """Half-way between the means of the passes of either direction, which share one scatter, and a whole count.
+
+    The scatter is widened so that twice it is exceeded as seldom as twice that of a normal distribution.
+    """
+    sides = [numpy.array(it) for it in task["origins"]]
+    freedom = sum(len(it) - 1 for it in sides)
+    squares = sum(((it - it.mean()) ** 2).sum() for it in sides)
+    u = math.sqrt(squares / freedom) * stats.t.isf(0.0455 / 2, freedom) / 2
+    origins = [float(it) for side in sides for it in side]
+    inputs = multiple_ureal(origins, [u] * len(origins), freedom)
+    weights = [1 / (2 * len(side)) for side in sides for _ in side]
+    origin = combined(weights, inputs) + ureal(0, type_b.uniform(task["count"] / 2))
+    return [value(origin), *told(origin)]
+
+
+def of_now(task):
+    """The tool along x, y and z, d + turn × tool, of six errors with a covariance and of inputs by themselves."""
+    known = task["covariance"]
+    errors = [ureal(0, math.sqrt(known[k][k]), independent=False) for k in range(6)]
+    for i in range(6):
+        for k in range(i):
+            correlation = known[i][k] / math.sqrt(known[i][i] * known[k][k])
+            set_correlation(correlation, errors[i], errors[k])
+    tx, ty, tz = task["tool"]
+    dx, dy, dz, rx, ry, rz = errors
+    moved = [dx + ry * tz - rz * ty, dy + rz * tx - rx * tz, dz + rx * ty - ry * tx]
+    for k, pulls in enumerate(task["pulls"]):
+        for pull in pulls:
+            moved[k] = moved[k] + ureal(0, abs(pull))
+    return [uncertainty(it) for it in moved]
+
+
 def main():
     task = json.load(sys.stdin)
-    again = {"table": of_table, "screw": of_screw, "tool": of_tool}[task["of"]](task)
+    ways = {"table": of_table, "screw": of_screw, "tool": of_tool, "zero": of_zero, "now": of_now}
+    again = ways[task["of"]](task)
     print(json.dumps({"record": of_record(task["budget"]), "again": again}), flush=True)
 
 

@@ -42,7 +42,7 @@ pub(crate) mod verify;
 mod warnings;
 mod worse;
 pub(crate) mod zero;
-mod zero_budget;
+pub(crate) mod zero_budget;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use course::{Corrected, Course, PlannedMove};

@@ -11,10 +11,7 @@ use crate::store::budget::PlacesBudgetRecord;
 ///
 /// The few degrees of freedom of the passes have widened their standard uncertainty already: that is in the
 /// sensitivity.
-pub(super) fn budget(
-    estimate: &ZeroEstimate,
-    count: f64,
-) -> Result<PlacesBudget<Metres>, BudgetError> {
+pub fn budget(estimate: &ZeroEstimate, count: f64) -> Result<PlacesBudget<Metres>, BudgetError> {
     let of_passes = estimate.standard_uncertainty.value();
     let known = estimate.passes.filter(|it| it.scatter > Metres::ZERO);
     let (name, scatter, freedom) = match known {
@@ -37,7 +34,7 @@ pub(super) fn budget(
 }
 
 /// As it is kept, of the zero at `origin`.
-pub(super) fn record(budget: &PlacesBudget<Metres>, origin: Metres) -> PlacesBudgetRecord {
+pub fn record(budget: &PlacesBudget<Metres>, origin: Metres) -> PlacesBudgetRecord {
     PlacesBudgetRecord::new(budget, vec![(vec![origin.value()], None)])
 }
 

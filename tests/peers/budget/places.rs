@@ -24,7 +24,7 @@ use crate::peer::Peer;
 
 /// Whether GTC comes to the places of the budget in `content` by its contributions; what it says of `task` by itself.
 #[track_caller]
-fn check_record(content: &Value, mut task: Value) -> Value {
+pub(super) fn check_record(content: &Value, mut task: Value) -> Value {
     task["budget"] = content["budget"].clone();
     let mut peer = Peer::start("budget_of_places.py", &[]);
     peer.feed(&task.to_string());
@@ -42,7 +42,7 @@ fn check_record(content: &Value, mut task: Value) -> Value {
 }
 
 #[track_caller]
-fn check_freedom(ours: &Value, theirs: &Value) {
+pub(super) fn check_freedom(ours: &Value, theirs: &Value) {
     match ours.as_f64() {
         Some(ours) => assert_close("degrees of freedom", ours, theirs, ours),
         None => assert_eq!(*theirs, Value::Null),
