@@ -22,6 +22,5 @@ pub struct VolumetricTeller {
     /// A corrected move that was made, by its last period.
     pub moved: fn(live: &Live) -> Told,
     /// A path that was followed, what joined its rows, and what later parts are made with when it was the first.
-    pub followed:
-        fn(followed: &PathFollowed, path: &CsvPath, kept: Option<&Remembered>) -> Told,
+    pub followed: fn(followed: &PathFollowed, path: &CsvPath, kept: Option<&Remembered>) -> Told,
 }

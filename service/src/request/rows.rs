@@ -109,7 +109,10 @@ mod tests {
         assert_eq!(read(table).unwrap(), text);
         assert_eq!(read(&serde_json::json!(text).to_string()).unwrap(), text);
         let joined = table.replacen('{', r#"{"join": "linear 50um", "#, 1);
-        assert_eq!(read(&joined).unwrap(), format!("# join: linear 50um\n{text}"));
+        assert_eq!(
+            read(&joined).unwrap(),
+            format!("# join: linear 50um\n{text}")
+        );
     }
 
     #[test]

@@ -93,11 +93,7 @@ fn followed_here(
 }
 
 /// What came of a path; `kept` is what later parts are made with, when it was the first.
-pub(super) fn followed(
-    followed: &PathFollowed,
-    path: &CsvPath,
-    kept: Option<&Remembered>,
-) -> Told {
+pub(super) fn followed(followed: &PathFollowed, path: &CsvPath, kept: Option<&Remembered>) -> Told {
     let said = match &followed.corrected {
         Some(corrected) => corrected_text(corrected),
         None => "NOT CORRECTED: by the encoders alone".into(),
