@@ -30,7 +30,8 @@ pub(crate) enum Order {
     /// A run under the name that it is to have.
     Plan {
         id: String,
-        request: RunRequest,
+        /// Apart: no other order is nearly as large.
+        request: Box<RunRequest>,
         /// What it follows or does, where that is in the request.
         judged: Option<Judged>,
     },

@@ -38,7 +38,7 @@ impl Desk {
         };
         Order::Plan {
             id: id.to_owned(),
-            request,
+            request: Box::new(request),
             judged,
         }
     }
