@@ -1,6 +1,7 @@
 //! GTC computes the same uncertainties, degrees of freedom and covariances from the same budgets.
 
 mod places;
+mod tool_now;
 mod zero;
 
 use compensator::budget::{AxisBudget, Contribution, Correlation, Evaluation};

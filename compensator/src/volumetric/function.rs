@@ -236,12 +236,17 @@ impl<Q: Quantity> Function<Q> {
 
     /// Its standard uncertainty there, that between the nodes included; `None` when the nodes have none.
     pub fn standard_uncertainty(&self, position: Metres) -> Option<Q> {
-        let pieces = self.uncertainty.as_ref()?;
-        let at_nodes = pieces.at(position.value());
+        let at_nodes = self.uncertainty_of_nodes(position)?.value();
         let between = self.between_at(position).value();
         Some(Q::from_value(
             (at_nodes * at_nodes + between * between).sqrt(),
         ))
+    }
+
+    /// What its nodes' standard uncertainties make there, by straight lines; `None` when they have none.
+    pub(super) fn uncertainty_of_nodes(&self, position: Metres) -> Option<Q> {
+        let pieces = self.uncertainty.as_ref()?;
+        Some(Q::from_value(pieces.at(position.value())))
     }
 
     /// How far the true function may be from this one there, by what it does between its nodes alone: a standard

@@ -21,7 +21,8 @@ use core::any::Any;
 use compensator::volumetric::function::Function;
 use compensator::volumetric::identify::{IdentifiedBend, IdentifiedExpansion};
 use compensator::volumetric::model::{
-    AxisErrors, ErrorCovariance, Machine as Model, Squareness, ThermalBend, VolumetricModel,
+    AxisErrors, Conditions, ErrorCovariance, Machine as Model, Squareness, ThermalBend,
+    VolumetricModel,
 };
 use compensator::volumetric::online::{
     AxisMonitor, BeamReference, DetectorLever, EndOfTravel, Feed, FeedStatus, Influences, Memories,
@@ -108,6 +109,8 @@ pub struct VolumetricCorrection {
     /// Of a displacement by detectors that are believed.
     u_displacement: Metres,
     u_roll: Radians,
+    /// For which command it gave a correction last, and as what the machine was then.
+    given: Option<(Point, Conditions)>,
 }
 
 impl VolumetricCorrection {
@@ -165,6 +168,7 @@ impl VolumetricCorrection {
             reaction: own.feed.as_ref().map(|it| it.reaction),
             u_displacement: u_displacement(own),
             u_roll: u_roll(own),
+            given: None,
         })
     }
 
@@ -265,6 +269,7 @@ impl Correction for VolumetricCorrection {
     }
 
     fn correct(&mut self, observed: &Observed<'_>) -> Corrected {
+        self.given = None;
         let (&[x, y, z], &[x_now, y_now, z_now]) = (observed.nominal, observed.actual) else {
             return nothing(Validity::Stop("the engine does not move three axes"));
         };
@@ -290,11 +295,14 @@ impl Correction for VolumetricCorrection {
             return nothing(Validity::Stop("the path leaves the calibrated volume"));
         };
         match self.model.command(inside, &now) {
-            Ok(command) => Corrected {
-                offset: per_axis(command - inside),
-                uncertainty: self.uncertainty(command, &now),
-                validity,
-            },
+            Ok(command) => {
+                self.given = Some((command, now));
+                Corrected {
+                    offset: per_axis(command - inside),
+                    uncertainty: self.uncertainty(command, &now),
+                    validity,
+                }
+            }
             Err(NoCorrection::Outside { .. }) => {
                 nothing(Validity::Stop("the path leaves the calibrated volume"))
             }

@@ -41,6 +41,7 @@ mod log;
 mod memory;
 pub(crate) mod memory_import;
 pub(crate) mod motion;
+pub(crate) mod moved;
 mod moves;
 pub(crate) mod path;
 pub(crate) mod record;

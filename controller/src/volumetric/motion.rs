@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::memories::Memory;
 use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, PartMoved, Place, Teller};
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::moved::VolumetricMoved;
 use crate::volumetric::moves::check_in;
 use crate::volumetric::path::PathFollowed;
 use crate::volumetric::settings::work_volume;
@@ -141,12 +142,17 @@ impl WorkVolume<'_> {
     ///
     /// # Errors
     /// Those of [`Self::correct`] and [`Self::drive_to`].
-    pub(crate) fn go_corrected(&mut self, ready: Ready, target: Point) -> Result<Live, Failure> {
+    pub(crate) fn go_corrected(
+        &mut self,
+        ready: Ready,
+        target: Point,
+    ) -> Result<VolumetricMoved, Failure> {
         let Ready { mut mover, records } = ready;
         self.correct(&mut mover, true)?;
         let live = self.drive_to(&mut mover, target, STAND)?;
-        self.last().0 = Some((Ready { mover, records }, live));
-        Ok(live)
+        let moved = VolumetricMoved::of(&mut mover, live);
+        self.last().0 = Some((Ready { mover, records }, moved.live));
+        Ok(moved)
     }
 
     fn last(&mut self) -> &mut LastMove {
@@ -257,7 +263,8 @@ fn perform(
     let mut volume = machine.volumetric().map_err(NotMoved::Before)?;
     let axes = volume.config().axes.clone();
     let (ready, target) = prepare(&mut volume, store, asked).map_err(NotMoved::Before)?;
-    let live = volume.go_corrected(ready, target)?;
+    let moved = volume.go_corrected(ready, target)?;
+    let live = moved.live;
     let mut parts = Vec::new();
     for (k, axis) in axes.into_iter().enumerate() {
         let reading = volume.core.reading(&axis).map_err(Failure::from)?;
@@ -273,6 +280,6 @@ fn perform(
     let words = teller.and_then(|it| it.of::<VolumetricTeller>());
     Ok(GroupMoved {
         parts,
-        told: words.map(|it| (it.moved)(&live)),
+        told: words.map(|it| (it.moved)(&moved)),
     })
 }

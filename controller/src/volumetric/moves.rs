@@ -31,6 +31,11 @@ impl Mover {
         &self.engine
     }
 
+    /// Its newest period.
+    pub(super) fn newest(&mut self) -> Option<Live> {
+        self.desk.live()
+    }
+
     /// Whether the tool can be moved to `target`, before anything moves.
     ///
     /// # Errors

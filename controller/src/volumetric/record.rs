@@ -218,11 +218,13 @@ impl GeometryContent {
     /// When the numbers are none.
     pub(crate) fn covariance(&self, id: &str) -> Result<Option<ErrorCovariance>, StoreError> {
         let known = self.covariance.as_ref().map(CovarianceRecord::covariance);
-        known.transpose().map_err(|source| StoreError::Part {
+        let known = known.transpose().map_err(|source| StoreError::Part {
             id: short(id),
             name: "covariance".into(),
             source: source.into(),
-        })
+        })?;
+        let freedom = self.agreement.and_then(|it| it.enlarged_with());
+        Ok(known.map(|it| it.with_degrees_of_freedom(freedom)))
     }
 
     /// The error functions, in the calibration `id`.

@@ -1,8 +1,9 @@
 //! What three axes gave, in the words of the command line.
 
-use machine::engine::{CsvPath, Live};
+use machine::engine::CsvPath;
 
 use crate::runs::Told;
+use crate::volumetric::moved::VolumetricMoved;
 use crate::volumetric::path::PathFollowed;
 use crate::volumetric::reference::VolumetricReferenced;
 use crate::volumetric::verify::VolumetricVerified;
@@ -19,8 +20,8 @@ pub struct VolumetricTeller {
     pub verified: fn(verified: &VolumetricVerified) -> Told,
     /// References that were taken.
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
-    /// A corrected move that was made, by its last period.
-    pub moved: fn(live: &Live) -> Told,
+    /// A corrected move that was made.
+    pub moved: fn(moved: &VolumetricMoved) -> Told,
     /// A path that was followed, what joined its rows, and what later parts are made with when it was the first.
     pub followed: fn(followed: &PathFollowed, path: &CsvPath, kept: Option<&Remembered>) -> Told,
 }

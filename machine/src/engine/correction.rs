@@ -181,6 +181,10 @@ impl Applied {
         core::mem::replace(&mut self.correction, correction)
     }
 
+    pub(super) fn in_use(&self) -> Option<&dyn Any> {
+        self.correction.as_any()
+    }
+
     fn expect_jump(&mut self) {
         for slewed in &mut self.slewed {
             slewed.expect_jump();

@@ -4,6 +4,7 @@
 //! test drives it by hand. Everything has a fixed size; nothing here waits or asks for memory,
 //! except for the text of a failure that ends the loop.
 
+use core::any::Any;
 use core::time::Duration;
 
 use rtrb::{Consumer, Producer};
@@ -122,6 +123,10 @@ impl Core {
 
     pub(super) const fn state(&self) -> State {
         self.state
+    }
+
+    pub(super) fn correction(&self) -> Option<&dyn Any> {
+        self.applied.in_use()
     }
 
     pub(super) fn counts(&self) -> Counts {

@@ -40,6 +40,7 @@ mod run;
 mod seats;
 mod tables;
 
+use core::any::Any;
 use core::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -212,6 +213,11 @@ impl Engine {
     /// What the loop is doing, or did last.
     pub const fn state(&self) -> State {
         self.core.state()
+    }
+
+    /// The correction in use, of one that gives itself away ([`Correction::as_any`]).
+    pub fn correction(&self) -> Option<&dyn Any> {
+        self.core.correction()
     }
 
     /// What was counted.

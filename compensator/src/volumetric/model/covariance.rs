@@ -53,6 +53,7 @@ pub enum CovarianceError {
 pub struct ErrorCovariance {
     positions: [Vec<f64>; 3],
     places: Vec<[f64; ENTRIES]>,
+    freedom: Option<f64>,
 }
 
 impl ErrorCovariance {
@@ -81,8 +82,23 @@ impl ErrorCovariance {
         }
         match places.iter().position(|it| !is_sound(it)) {
             Some(place) => Err(CovarianceError::Value { place }),
-            None => Ok(Self { positions, places }),
+            None => Ok(Self {
+                positions,
+                places,
+                freedom: None,
+            }),
         }
+    }
+
+    /// The same, known as well as an estimate of so many degrees of freedom; `None` for infinitely many.
+    #[must_use]
+    pub fn with_degrees_of_freedom(self, freedom: Option<f64>) -> Self {
+        Self { freedom, ..self }
+    }
+
+    /// How well it is known; `None` for infinitely many degrees of freedom.
+    pub const fn degrees_of_freedom(&self) -> Option<f64> {
+        self.freedom
     }
 
     /// Where the places are along x, y and z.

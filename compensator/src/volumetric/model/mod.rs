@@ -244,7 +244,7 @@ impl VolumetricModel {
             twist: [[0.0; 4]; 3],
             growth: wide(sums.growth),
             gradients: [[0.0; 3]; 3],
-            u_expansion: sums.u_expansion,
+            u_expansion: sums.u_expansion.map(f64::abs),
         };
         for (k, fixed) in fixed.into_iter().enumerate() {
             now.lean[k][k] += sums.expansion[k];

@@ -1,5 +1,7 @@
 //! The uncertainty of the deviation, from the uncertainties of all its contributions.
 
+mod budget;
+
 use units::{Metres, Quantity, Radians};
 
 use super::thermal::ThermalSums;
@@ -7,6 +9,33 @@ use super::{Conditions, Squareness, ThermalBend, VolumetricModel};
 use crate::volumetric::function::Function;
 use crate::volumetric::point::{V3, add, cross};
 use crate::volumetric::{Axis, NoCorrection, Point};
+
+/// Something whose uncertainty makes that of the deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Input {
+    /// Functions at their nodes, and squarenesses.
+    Errors,
+    /// What functions do between their nodes.
+    Between,
+    /// What the detectors on the slide of an axis say of its displacement.
+    Displacement(Axis),
+    /// What they say of its roll.
+    Roll(Axis),
+    /// A thermometer, from 0.
+    Temperature(usize),
+    /// By how much the scale of an axis expands.
+    Expansion(Axis),
+    /// By how much the guide of an axis bends towards a direction.
+    Bend(Axis, Axis),
+}
+
+/// What is known of this moment: the standard uncertainties of displacements and rolls that detectors see, and of
+/// temperatures in kelvin by channel.
+struct Now<'a> {
+    displacement: Metres,
+    roll: Radians,
+    temperatures: &'a [f64],
+}
 
 impl VolumetricModel {
     /// The standard uncertainty of the deviation at a command: of the functions, squarenesses,
@@ -29,61 +58,96 @@ impl VolumetricModel {
         u_temperatures: &[f64],
     ) -> Result<Point, NoCorrection> {
         self.commands.check(command)?;
-        let known = self.covariance.as_ref();
-        let tool = core::array::from_fn(|k| now.tool[k]);
-        let mut squares = known.map_or([0.0; 3], |it| it.variances(command, tool));
-        let mut combine = |effect: V3, u: f64| {
+        let mut squares = self.variances_in_common(command, now).unwrap_or([0.0; 3]);
+        let known = Now {
+            displacement: u_displacement,
+            roll: u_roll,
+            temperatures: u_temperatures,
+        };
+        self.each_input(command, now, &known, |_, effect, u| {
             for k in 0..3 {
                 squares[k] += effect[k] * effect[k] * u * u;
             }
-        };
+        });
+        Ok(Point::of(squares.map(f64::sqrt)))
+    }
+
+    /// What functions and squarenesses make of the deviation, where it is known what they have in common.
+    fn variances_in_common(&self, command: Point, now: &Conditions) -> Option<V3> {
+        let tool = core::array::from_fn(|k| now.tool[k]);
+        Some(self.covariance.as_ref()?.variances(command, tool))
+    }
+
+    /// Tells `each` of every input that is independent of the others: what a unit of it moves the tool by, and its
+    /// standard uncertainty. Some come in several pieces.
+    fn each_input(
+        &self,
+        command: Point,
+        now: &Conditions,
+        known: &Now<'_>,
+        mut each: impl FnMut(Input, V3, f64),
+    ) {
+        let is_known = self.covariance.is_some();
         for axis in Axis::ALL {
             let lever = self.lever(axis, command, now);
             let errors = &self.machine.axes[axis.index()];
             let position = command.along(axis);
             for direction in Axis::ALL {
                 let k = direction.index();
-                let unit: V3 = core::array::from_fn(|i| f64::from(u8::from(i == k)));
-                let sideways = direction != axis;
-                let u_live = if sideways {
-                    u_displacement.value()
+                let moves = unit(direction);
+                let turns = cross(moves, lever);
+                let along = errors.along[k].as_ref();
+                each(Input::Errors, moves, u_at_nodes(along, position, is_known));
+                each(Input::Between, moves, u_between(along, position, is_known));
+                let about = errors.about[k].as_ref();
+                each(Input::Errors, turns, u_at_nodes(about, position, is_known));
+                each(Input::Between, turns, u_between(about, position, is_known));
+                if direction == axis {
+                    each(Input::Roll(axis), turns, known.roll.value());
                 } else {
-                    u_roll.value()
-                };
-                let along = u_of(errors.along[k].as_ref(), position, known.is_some());
-                let about = u_of(errors.about[k].as_ref(), position, known.is_some());
-                combine(unit, along);
-                combine(cross(unit, lever), about);
-                combine(if sideways { unit } else { cross(unit, lever) }, u_live);
+                    each(Input::Displacement(axis), moves, known.displacement.value());
+                }
             }
         }
         let own = self.machine.squareness.u.iter().enumerate();
-        for (k, u) in own.filter(|_| known.is_none()) {
+        for (k, u) in own.filter(|_| !is_known) {
             let mut one = [0.0; 3];
             one[k] = 1.0;
-            combine(lean_effect(Squareness::lean(one), command), u.value());
+            let leans = lean_effect(Squareness::lean(one), command);
+            each(Input::Errors, leans, u.value());
         }
+        self.each_warmth(command, now, known, each);
+    }
+
+    /// The same of temperatures, and of what is known of their effects.
+    fn each_warmth(
+        &self,
+        command: Point,
+        now: &Conditions,
+        known: &Now<'_>,
+        mut each: impl FnMut(Input, V3, f64),
+    ) {
         let thermal = &self.machine.thermal;
         let way = (command - thermal.fixed).array();
         let u_of_channel = |at: usize| {
-            let known = u_temperatures.get(at).copied();
+            let known = known.temperatures.get(at).copied();
             known.unwrap_or(thermal.channels[at].u)
         };
         for at in 0..thermal.channels.len() {
             let effect = self.effect_of_channel(at, command, now, u_of_channel);
-            combine(effect, u_of_channel(at));
+            each(Input::Temperature(at), effect, u_of_channel(at));
         }
         for axis in Axis::ALL {
             let k = axis.index();
-            let unit: V3 = core::array::from_fn(|i| f64::from(u8::from(i == k)));
-            combine(unit, now.u_expansion[k] * way[k]);
+            let grows = unit(axis).map(|it| it * way[k]);
+            each(Input::Expansion(axis), grows, now.u_expansion[k]);
         }
         for bend in &thermal.bends {
             let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
             let effect = self.arc_effect(bend, command, now);
-            combine(effect, bend.u.value() * gradient);
+            let bows = effect.map(|it| it * gradient);
+            each(Input::Bend(bend.axis, bend.towards), bows, bend.u.value());
         }
-        Ok(Point::of(squares.map(f64::sqrt)))
     }
 
     /// What a kelvin of one thermometer moves the tool by, as far as uncertainties can make it.
@@ -131,11 +195,24 @@ fn lean_effect(lean: [V3; 3], command: Point) -> V3 {
     core::array::from_fn(|k| lean[0][k] * q[0] + lean[1][k] * q[1] + lean[2][k] * q[2])
 }
 
-/// Of what the function does between its nodes alone, where it is known what the nodes have in common.
-fn u_of<Q: Quantity>(function: Option<&Function<Q>>, position: Metres, between_alone: bool) -> f64 {
-    let u = function.and_then(|it| match between_alone {
-        true => Some(it.between_at(position)),
-        false => it.standard_uncertainty(position),
-    });
+fn unit(axis: Axis) -> V3 {
+    core::array::from_fn(|k| f64::from(u8::from(k == axis.index())))
+}
+
+/// At its nodes, and by straight lines between them; none where it is known what all functions have in common.
+fn u_at_nodes<Q: Quantity>(
+    function: Option<&Function<Q>>,
+    position: Metres,
+    is_known: bool,
+) -> f64 {
+    let own = function.filter(|_| !is_known);
+    let u = own.and_then(|it| it.uncertainty_of_nodes(position));
     u.map_or(0.0, Q::value)
+}
+
+/// By what it does between its nodes; of a function whose nodes nobody states an uncertainty of, nothing is stated.
+fn u_between<Q: Quantity>(function: Option<&Function<Q>>, position: Metres, is_known: bool) -> f64 {
+    let stated = |it: &&Function<Q>| is_known || it.uncertainty_of_nodes(position).is_some();
+    let own = function.filter(stated);
+    own.map_or(0.0, |it| it.between_at(position).value())
 }

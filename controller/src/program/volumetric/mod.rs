@@ -6,6 +6,7 @@ pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
 pub(crate) mod memory_args;
+pub(crate) mod moved;
 pub(crate) mod part;
 pub(crate) mod reference;
 mod report;

@@ -1,6 +1,6 @@
 //! Runs of three axes in the words of the command line, for whoever keeps a machine.
 
-use crate::program::volumetric::{part, reference, verbs};
+use crate::program::volumetric::{moved, part, reference, verbs};
 use crate::runs::Told;
 use crate::volumetric::VolumetricTeller;
 
@@ -14,7 +14,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         text: verbs::verified_text(verified),
         value: verbs::verified_value(verified),
     },
-    moved: verbs::moved,
+    moved: moved::moved,
     followed: part::followed,
     referenced: |taken| Told {
         text: reference::referenced_text(taken),

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use compensator::volumetric::identify::{Identified, scatter_limit};
 use compensator::volumetric::{Axis, Point};
-use machine::engine::Live;
 use machine::records::short;
 use serde_json::{Value, json};
 use units::Metres;
@@ -17,6 +16,7 @@ use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::text::verdict;
+use crate::program::volumetric::moved::moved;
 use crate::program::volumetric::uncertainty;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::runs::Told;
@@ -307,8 +307,8 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         }
     };
     let machine = &args.machine;
-    let (live, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
-    let told = live.as_ref().map_or_else(by_encoders, moved);
+    let (made, counters) = with_zeroed_volume(machine, "move", Use::Motion, output, ready, run)?;
+    let told = made.as_ref().map_or_else(by_encoders, moved);
     output.told(told, counters)
 }
 
@@ -317,35 +317,4 @@ fn by_encoders() -> Told {
         text: "NOT CORRECTED: the axes went by their encoders alone".into(),
         value: json!({"corrected": false}),
     }
-}
-
-pub(super) fn moved(live: &Live) -> Told {
-    Told {
-        text: live_text(live),
-        value: json!({"corrected": live.corrected, "axes": live_value(live)}),
-    }
-}
-
-fn live_text(live: &Live) -> String {
-    let rows = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
-        let offset = live.offset[k].um();
-        let u = match live.uncertainty[k].um() {
-            known if known.is_finite() => format!("{known:.3} µm"),
-            _ => "unknown".into(),
-        };
-        let set_point = (live.nominal[k] + live.offset[k]).mm();
-        format!(
-            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
-            live.nominal[k].mm()
-        )
-    });
-    rows.collect::<Vec<_>>().join("\n")
-}
-
-fn live_value(live: &Live) -> Value {
-    let axes = ["x", "y", "z"].iter().enumerate().map(|(k, name)| {
-        json!({"axis": name, "target_mm": live.nominal[k].mm(), "correction_um": live.offset[k].um(),
-               "u_um": live.uncertainty[k].um()})
-    });
-    axes.collect()
 }

@@ -1,5 +1,6 @@
 //! The uncertainty of the correction, from the uncertainty of each value that is used.
 
+use compensator::budget::PlacesBudget;
 use compensator::volumetric::Point;
 use compensator::volumetric::model::Conditions;
 use compensator::volumetric::online::FeedStatus;
@@ -44,12 +45,26 @@ impl VolumetricCorrection {
 
     /// The standard uncertainties at `command`.
     pub(super) fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
-        let (u_displacement, u_roll) = (self.u_displacement(), self.u_roll());
+        let (displacement, roll, temperatures) = self.u_of_inputs();
+        let u = self
+            .model
+            .standard_uncertainty(command, now, displacement, roll, temperatures);
+        u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
+    }
+
+    /// What makes the correction uncertain that was given last: along x, y and z, the budget's places in this order.
+    /// `None` where none was given, and where nothing is uncertain.
+    pub fn budget(&self) -> Option<PlacesBudget<Metres>> {
+        let (command, now) = self.given.as_ref()?;
+        let (displacement, roll, temperatures) = self.u_of_inputs();
+        self.model
+            .uncertainty_budget(*command, now, displacement, roll, temperatures)
+    }
+
+    /// Of displacements, rolls and temperatures, as they are known now.
+    fn u_of_inputs(&self) -> (Metres, Radians, &[f64]) {
         let temperatures = self.thermometers.as_ref();
         let u_temperatures = temperatures.map_or(&[][..], Thermometers::u_kelvin);
-        let u =
-            self.model
-                .standard_uncertainty(command, now, u_displacement, u_roll, u_temperatures);
-        u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
+        (self.u_displacement(), self.u_roll(), u_temperatures)
     }
 }

@@ -21,6 +21,16 @@ pub struct AgreementRecord {
 }
 
 impl AgreementRecord {
+    /// How well uncertainties are known that were enlarged because readings scatter more than was stated of them; `None`
+    /// for infinitely many degrees of freedom: they are as stated.
+    ///
+    /// What was added has those of the scatter (Welch and Satterthwaite).
+    pub(crate) fn enlarged_with(&self) -> Option<f64> {
+        let ratio = self.scatter_ratio.filter(|it| *it > 1.0)?;
+        let added = 1.0 - 1.0 / (ratio * ratio);
+        Some(self.degrees_of_freedom as f64 / (added * added))
+    }
+
     /// `31 lines, 402 readings, 96 beyond the unknowns, scatter 0.47 of what was stated`.
     pub fn readings_text(&self) -> String {
         let ratio = self.scatter_ratio;
