@@ -5,6 +5,7 @@ mod frame;
 use core::time::Duration;
 use std::path::Path;
 
+use compensator::budget::PlacesBudget;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{AxisErrors, Squareness};
 use compensator::volumetric::{Axis, Point};
@@ -65,12 +66,14 @@ pub struct Volume {
 }
 
 /// How far the tool is off where it stands, and what the correction says of itself there.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Stood {
     /// By how much it is off.
     pub off: Off,
     /// The standard uncertainties that are stated.
     pub stated: Off,
+    /// What makes these: along x, y and z, its places in this order; `None` where nothing is stated.
+    pub budget: Option<PlacesBudget<Metres>>,
 }
 
 /// A point given in millimetres.
@@ -468,9 +471,12 @@ impl Volume {
                     .unwrap()
                     .drive_watched(mover, target, STAND, &mut watch),
             );
+            let correction = mover.engine().correction();
+            let correction = correction.and_then(|it| it.downcast_ref::<VolumetricCorrection>());
             Stood {
                 off: self.off(target),
                 stated: core::array::from_fn(|k| live.uncertainty[k]),
+                budget: correction.and_then(VolumetricCorrection::budget),
             }
         };
         places.iter().map(stand).collect()

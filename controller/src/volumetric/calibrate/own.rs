@@ -8,14 +8,17 @@ use units::{Metres, Radians};
 use crate::volumetric::AXES;
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::calibrate::plan::nodes;
-use crate::volumetric::settings::point_of_mm;
+use crate::volumetric::settings::{point_of_mm, volume_axis};
 
-/// The least standard uncertainty of a straightness by a beam: the air along it.
+/// The standard uncertainty of a straightness by a beam where nobody states that of its detectors: the air along it.
 const BEAM_FLOOR: Metres = Metres(0.1e-6);
-/// By how much of its size such a reading may be wrong: the width of the spot.
-const BEAM_SCALE: f64 = 0.01;
-/// Likewise of a roll that the machine's own detectors read.
+/// By how much of its size such a reading may be wrong, as a standard uncertainty: the width of the spot, which is known
+/// to 1 % either way.
+const BEAM_SCALE: f64 = 0.01 / 1.732;
+/// The standard uncertainty of a roll that the machine's own detectors read, where nobody states it of them.
 const ROLL_FLOOR: Radians = Radians(0.5e-6);
+/// By how much of its size such a reading may be wrong: volts per millimetre.
+const ROLL_SCALE: f64 = 0.01;
 /// A stop this close to a node is at it.
 const AT_A_NODE_M: f64 = 1e-6;
 
@@ -54,7 +57,10 @@ impl Session<'_> {
         run: usize,
     ) -> Option<Vec<Observation>> {
         let reference = self.beams[axis.index()].as_ref()?;
-        let beam = self.config.beam.each()[axis.index()]?.on_the_slide()?;
+        let beam = self.config.beam.each()[axis.index()]?;
+        let stated = beam.standard_uncertainty_um;
+        let own = stated.map_or(BEAM_FLOOR, Metres::from_um);
+        let beam = beam.on_the_slide()?;
         let record = self.references.content.beams.iter();
         let letter = ['x', 'y', 'z'][axis.index()];
         let record = record.clone().find(|it| it.axis == letter)?;
@@ -68,7 +74,7 @@ impl Session<'_> {
             let strayed = reference.slider(position)[place];
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             let scale = (strayed - first).value() * BEAM_SCALE;
-            let u = hypot(hypot(BEAM_FLOOR.value(), u_mean), scale);
+            let u = hypot(hypot(own.value(), u_mean), scale);
             let at = self.on_axis(axis, position);
             // The slide's tilts act on the detector's place on it alone: not on what an offset of
             // the tool is added to.
@@ -93,8 +99,11 @@ impl Session<'_> {
         let stops = self.stops_at_nodes(axis, &record.positions_m);
         let u = record.standard_uncertainties_si.as_ref();
         let sense = self.known.chain().sense(axis);
+        let first = reference.at(Metres(record.positions_m[0]));
+        let own = self.u_roll(axis).value();
         let each = stops.into_iter().map(|(index, position)| {
-            let u = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
+            let u_mean = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
+            let scale = (reference.at(position) - first).value() * ROLL_SCALE;
             Observation {
                 at: self.on_axis(axis, position),
                 tool: Point::ZERO,
@@ -102,11 +111,19 @@ impl Session<'_> {
                 reading: Reading::Angle {
                     about: axis,
                     deviation: reference.at(position) * sense,
-                    u: Radians(hypot(ROLL_FLOOR.value(), u)),
+                    u: Radians(hypot(hypot(own, u_mean), scale)),
                 },
             }
         });
         Some(each.collect())
+    }
+
+    /// What is stated of the detectors that see the roll of `axis`.
+    fn u_roll(&self, axis: Axis) -> Radians {
+        let mut each = self.config.roll.each().iter();
+        let own = each.find(|it| volume_axis(it.axis) == axis);
+        let stated = own.and_then(|it| it.standard_uncertainty_arcsec);
+        stated.map_or(ROLL_FLOOR, Radians::from_arcsec)
     }
 
     /// Stops that are at nodes, which are not drawn by straight lines; all where none is.
