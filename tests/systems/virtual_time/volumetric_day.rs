@@ -404,7 +404,7 @@ fn days_of(
 const THERMOMETERS_K: f64 = 0.003;
 /// Likewise what its beams are off by, micrometres: air, a source that shifts where it is taken to swing, the width of the
 /// spot ([`coverage_of_what_is_seen`] counts it).
-const BEAMS_UM: f64 = 0.07;
+const BEAMS_UM: f64 = 0.09;
 
 /// A laser whose errors are drawn from what is stated of them (one that repeats with each half wavelength is as good as
 /// chance from reading to reading, and does not average out), and detectors of roll on all three slides, with a tool on
