@@ -216,16 +216,17 @@ fn wrapped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::example::Example;
     use super::*;
     use crate::config::parse;
-    use crate::program::kind::KINDS;
+    use clap::ValueEnum;
 
     const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
 
     #[test]
     fn what_is_written_is_the_example_with_every_key_explained_once_and_its_own_values_marked() {
-        for demo in KINDS.iter().flat_map(|it| it.demos) {
-            let [_, example, _] = demo.files;
+        for demo in Example::value_variants() {
+            let example = demo.text;
             let text = Draft::of(example).text();
             let seen = parse(&text, "new.toml").unwrap_or_else(|error| panic!("{error}"));
             let shipped = parse(example, "shipped.toml").expect("it ships");

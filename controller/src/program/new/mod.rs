@@ -1,6 +1,7 @@
 //! `truestage new`: a machine's file to begin with, from an example that ships, answers and what a scan found.
 
 mod draft;
+mod example;
 mod found;
 mod questions;
 
@@ -12,12 +13,12 @@ use clap::Args;
 use serde_json::json;
 
 use self::draft::Draft;
+use self::example::Example;
 use crate::Failure;
 use crate::config;
 use crate::config::lines::MARK;
 use crate::ports::Overrides;
 use crate::program::data_text::read;
-use crate::program::demo::which::Which;
 use crate::program::output::{Ended, Output};
 
 /// What it is made from.
@@ -28,7 +29,7 @@ pub(crate) struct NewArgs {
     config: PathBuf,
     /// The machine that ships and is most like yours.
     #[arg(long)]
-    machine: Option<Which>,
+    machine: Option<Example>,
     /// Where a bus or a line is found: `can0=socketcan:can0`, `can0=slcan:/dev/ttyACM1`, `laser=/dev/ttyACM0`. May be
     /// given several times.
     #[arg(long = "port", value_name = "NAME=ENDPOINT")]
@@ -47,12 +48,12 @@ pub(crate) struct NewArgs {
 pub(crate) fn run(args: &NewArgs, output: Output) -> Ended {
     refuse_existing(&args.config)?;
     let is_asked = !args.yes && stdin().is_terminal() && stderr().is_terminal();
-    let Which(example) = match (args.machine, is_asked) {
+    let example = match (args.machine, is_asked) {
         (Some(which), _) => which,
         (None, true) => questions::which(output)?,
         (None, false) => return Err(no_machine()),
     };
-    let [_, text, _] = example.files;
+    let text = example.text;
     let mut draft = Draft::of(text);
     let notes = fill(&mut draft, text, args)?;
     if is_asked {

@@ -6,21 +6,21 @@ use std::io::{BufRead, stdin};
 use clap::ValueEnum;
 
 use super::draft::{Draft, Place};
+use super::example::Example;
 use crate::Failure;
 use crate::config::lines::key_on;
 use crate::config::{self, ConfigError, Diagnostic};
-use crate::program::demo::which::Which;
 use crate::program::output::Output;
 
 /// Which of the machines that ship is most like his.
-pub(super) fn which(output: Output) -> Result<Which, Failure> {
+pub(super) fn which(output: Output) -> Result<Example, Failure> {
     output.note("Which machine is yours most like?");
-    for it in Which::value_variants() {
-        output.note(&format!("  {:<12} {}", it.0.name, it.0.help));
+    for it in Example::value_variants() {
+        output.note(&format!("  {:<12} {}", it.name, it.help));
     }
     loop {
         let typed = answer().ok_or_else(nobody)?;
-        match Which::from_str(&typed, true) {
+        match Example::from_str(&typed, true) {
             Ok(which) => return Ok(which),
             Err(_) => output.note(&format!("`{typed}` is none of them")),
         }
