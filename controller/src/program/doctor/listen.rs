@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 
 use drivers::transport::Transport;
 use units::Several;
+use wire::can::BusErrorClass;
 use wire::{Arrival, Input, Payload, Port};
 
 use super::checked::Checked;
-use crate::config::{Loaded, MachineConfig};
+use crate::config::{CanTransport, Loaded, MachineConfig};
 use crate::ports::{self, Overrides, Use};
 use crate::program::MachineArgs;
 use crate::{Failure, assemble};
@@ -29,6 +30,10 @@ struct Heard {
     frames: u32,
     syncs: u32,
     errors: u32,
+    /// Those of them that a wrong bit rate makes: bits where none can be.
+    garbled: u32,
+    /// Whether the controller has given up.
+    is_off: bool,
     /// Requests to nodes, by their numbers.
     requests: BTreeMap<u8, u32>,
     /// Heartbeats, by their numbers.
@@ -39,8 +44,11 @@ impl Heard {
     fn take(&mut self, input: &Input) {
         let frame = match input {
             Input::Payload(Payload::Frame(frame)) => frame,
-            Input::BusError(_) => {
+            Input::BusError(error) => {
                 self.errors += 1;
+                let of_bits = BusErrorClass::PROTOCOL | BusErrorClass::BUS_ERROR;
+                self.garbled += u32::from(error.class.intersects(of_bits));
+                self.is_off |= error.class.contains(BusErrorClass::BUS_OFF);
                 return;
             }
             _ => return,
@@ -91,7 +99,8 @@ pub(super) fn checks(
 fn judged(config: &MachineConfig, bus: &str, heard: &Heard) -> Vec<Checked> {
     let mut found = Vec::new();
     let subject = format!("{bus} traffic");
-    if heard.errors > 0 {
+    found.extend(wrong_bit_rate(config, bus, heard));
+    if found.is_empty() && heard.errors > 0 {
         found.push(Checked::bad(
             &subject,
             format!("{} in {} s", Several(heard.errors, "error frame"), LISTEN.as_secs()),
@@ -105,12 +114,50 @@ fn judged(config: &MachineConfig, bus: &str, heard: &Heard) -> Vec<Checked> {
         found.push(match heard.frames {
             0 => Checked::not_told(
                 &subject,
-                "silent, as devices are that nobody has started; `truestage scan` asks them",
+                "silent, as devices are that nobody has started, and those of another bit rate behind an adapter; \
+                 `truestage scan` asks them",
             ),
             frames => Checked::good(&subject, Several(frames, "frame").to_string()),
         });
     }
     found
+}
+
+/// With another bit rate than the others have no frame is read: only what breaks the rules of bits is seen, or the
+/// controller has given up. An adapter (SLCAN) says nothing of errors; where whoever sends heartbeats is not heard, a
+/// wrong rate is one cause.
+fn wrong_bit_rate(config: &MachineConfig, bus: &str, heard: &Heard) -> Option<Checked> {
+    let own = config.can.get(bus)?;
+    let rate = own.bitrate_bit_per_s;
+    if heard.frames > 0 {
+        return None;
+    }
+    let seen = match (heard.is_off, heard.garbled) {
+        (true, _) => "the controller has given up (bus-off), and no frame was read".to_owned(),
+        (false, 0) => return None,
+        (false, garbled) => format!(
+            "no frame, and {} of bits where none can be in {} s",
+            Several(garbled, "error frame"),
+            LISTEN.as_secs()
+        ),
+    };
+    let set_up = match own.transport {
+        CanTransport::SocketCan => format!(
+            "`bitrate_bit_per_s` and what `ip -details link show {0}` says of it must be the rate of the devices, which \
+             their switches or manuals say: sudo ip link set {0} down, then sudo ip link set {0} up type can bitrate RATE",
+            own.interface.as_deref().unwrap_or("can0")
+        ),
+        CanTransport::Slcan => {
+            "`bitrate_bit_per_s` must be the rate of the devices, which their switches or manuals say".to_owned()
+        }
+    };
+    Some(Checked::bad(
+        &format!("{bus} bit rate"),
+        format!("probably not {rate} bit/s: {seen}"),
+        &format!(
+            "{set_up}. If it is right: 60 Ω between CAN_H and CAN_L with power off, and a device that is on"
+        ),
+    ))
 }
 
 /// Whoever sends what only this program should.
@@ -189,6 +236,34 @@ mod tests {
         expect(&judged_of(&[]), "can0 traffic", Verdict::NotTold, says);
         let usual = judged_of(&[(0x701, 40), (0x702, 40)]);
         expect(&usual, "can0 traffic", Verdict::Good, ["80 frames", ""]);
+    }
+
+    #[track_caller]
+    fn check_errors(class: BusErrorClass, frames: u32, subject: &str, says: [&str; 2]) {
+        let config = parse(LINEAR, "m").unwrap().config;
+        let mut heard = Heard::default();
+        let controller = wire::can::ControllerProblem::empty();
+        heard.take(&Input::BusError(BusError { class, controller }));
+        let frame = CanFrame::standard(0x701, &[5]);
+        (0..frames).for_each(|_| heard.take(&Input::Payload(Payload::Frame(frame))));
+        let found = judged(&config, "can0", &heard);
+        expect(&found, subject, Verdict::Bad, says);
+    }
+
+    #[test]
+    fn a_wrong_bit_rate_is_suspected_where_bits_are_seen_and_no_frame() {
+        let says = [
+            "not 1000000 bit/s: no frame, and 1 error frame",
+            "rate of the devices",
+        ];
+        check_errors(BusErrorClass::PROTOCOL, 0, "can0 bit rate", says);
+        let says = ["bus-off", "60 Ω"];
+        check_errors(BusErrorClass::BUS_OFF, 0, "can0 bit rate", says);
+        // Whoever is heard has the right one.
+        let says = ["1 error frame in 2 s", "60 Ω"];
+        check_errors(BusErrorClass::PROTOCOL, 9, "can0 traffic", says);
+        // Nobody acknowledges: that is said of the wiring.
+        check_errors(BusErrorClass::NO_ACK, 0, "can0 traffic", says);
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod host;
 mod listen;
 mod ports;
 mod records;
+mod wall_clock;
 
 use serde_json::json;
 
@@ -17,10 +18,12 @@ use crate::program::MachineArgs;
 use crate::program::output::{Ended, Output};
 use checked::{Checked, Verdict};
 use host::Host;
+use wall_clock::Moment;
 
 pub(crate) fn run(args: &MachineArgs, output: Output) -> Ended {
     let loaded = config::load(&args.config)?;
     let overrides = Overrides::parse(&args.ports, &loaded.config)?;
+    let before = Moment::now();
     let host = Host::this();
     let store = loaded.config.machine.store();
     let endpoints = endpoints(&loaded.config, &overrides, Use::Measurement);
@@ -42,6 +45,7 @@ pub(crate) fn run(args: &MachineArgs, output: Output) -> Ended {
         (false, _) => not_heard("what is wrong above comes first"),
     };
     checks.extend(owner.into_iter().chain(heard));
+    checks.push(wall_clock::check(&host, &loaded.config, &store, before));
     told(&checks, output)
 }
 
