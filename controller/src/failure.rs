@@ -397,6 +397,18 @@ pub enum Failure {
         /// Where the run is written.
         journal: PathBuf,
     },
+    /// What measures has a certificate that does not hold today.
+    #[error("{key}: the certificate {} does not hold: {standing}; {help}", file.display())]
+    NotCertified {
+        /// Where it stands in the configuration.
+        key: String,
+        /// The certificate.
+        file: PathBuf,
+        /// Since when, or until when.
+        standing: String,
+        /// What to do.
+        help: &'static str,
+    },
     /// The command line asks for something that is not there.
     #[error("{what}; {help}")]
     Usage {
@@ -419,7 +431,7 @@ pub enum Failure {
     Emulator(#[from] EmulatedError),
 }
 
-fn in_use_text(in_use: Option<&str>) -> String {
+pub(crate) fn in_use_text(in_use: Option<&str>) -> String {
     in_use.map_or_else(
         || "the axis has no calibration now".into(),
         |id| format!("calibration {id}, used before, is in use again"),
@@ -427,6 +439,11 @@ fn in_use_text(in_use: Option<&str>) -> String {
 }
 
 impl Failure {
+    /// Whether a run has come to its end, and its result is a bad one.
+    pub(crate) fn is_of_result(&self) -> bool {
+        self.exit_code() == 5
+    }
+
     /// That nothing corrects `axis`.
     pub(crate) fn not_calibrated(axis: &str) -> Self {
         Self::NotCalibrated {

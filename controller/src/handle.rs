@@ -2,6 +2,9 @@
 
 use core::ops::{Deref, DerefMut};
 
+use drivers::device::Environment;
+use units::Metres;
+
 use crate::config::{ConfigHash, MachineConfig};
 use crate::connected::Machine;
 use crate::failure::Failure;
@@ -51,7 +54,41 @@ impl Core<'_> {
                 .iter()
                 .map(|it| it.name.to_owned())
                 .collect(),
+            certificates: config.certificate_records(),
         }
+    }
+
+    /// As the machine's, of an instrument whose certificates hold.
+    ///
+    /// # Errors
+    /// When one of them does not; as the machine's.
+    pub(crate) fn use_instrument(&mut self, name: &str) -> Result<(), Failure> {
+        run::require_certified(self.config, &format!("instrument.{name}."))?;
+        Ok(self.machine.use_instrument(name)?)
+    }
+
+    /// What the sensors of the instrument `name` say, with what their certificates correct.
+    pub(crate) fn environment_of(&self, name: &str) -> Result<Environment, Failure> {
+        let seen = self.devices().instrument(name)?.environment();
+        Ok(self.config.instrument[name].certified(&seen))
+    }
+
+    /// Tells what sensors of the instrument `name` read that they were not calibrated at, and of `way`, how far the
+    /// axis goes, what its scale was not.
+    pub(crate) fn tell_beyond_certified(
+        &mut self,
+        name: &str,
+        way: &[Metres],
+    ) -> Result<(), Failure> {
+        let seen = self.devices().instrument(name)?.environment();
+        let config = &self.config.instrument[name];
+        let of_sensors = config.beyond_certified(&seen).into_iter();
+        let of_scale = way.iter().find_map(|it| config.scale_beyond(*it));
+        for beyond in of_sensors.chain(of_scale) {
+            let told = format!("instrument {name}, {beyond}");
+            self.machine.observer().warning(&told);
+        }
+        Ok(())
     }
 
     /// What the records say of the drive of `axis`.

@@ -44,6 +44,7 @@
 mod agreed;
 mod assemble;
 mod bus_plan;
+mod certificate;
 #[cfg(test)]
 mod chance;
 pub mod config;
@@ -72,6 +73,7 @@ pub mod runs;
 mod store;
 mod stores;
 pub mod volumetric;
+mod worse;
 
 // A machine, what its moves may do without, and why it stopped or refused.
 pub use agreed::Agreed;

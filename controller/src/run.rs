@@ -4,6 +4,7 @@
 use core::f64::consts::TAU;
 use std::path::PathBuf;
 
+use crate::certificate;
 use crate::config::{ConfigHash, MachineConfig};
 use crate::failure::Failure;
 use crate::made_by::made_by;
@@ -18,7 +19,7 @@ pub struct CalibrateOptions {
     pub resume: Option<PathBuf>,
     /// Save although the closure error is above its limit.
     pub accept_drift: bool,
-    /// Store what is found, and go on using what was used before (linear axes).
+    /// Store what is found, and go on using what was used before.
     pub aside: bool,
 }
 
@@ -26,6 +27,30 @@ pub struct CalibrateOptions {
 pub(crate) fn utc_now() -> String {
     let now = jiff::Timestamp::now();
     now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}
+
+/// Whether the certificates of `config` whose keys begin with `of` hold today.
+///
+/// # Errors
+/// Of the first that does not: nothing is measured with what it certifies.
+pub(crate) fn require_certified(config: &MachineConfig, of: &str) -> Result<(), Failure> {
+    let today = certificate::today();
+    let own = config.certificates().into_iter();
+    for (key, _, it) in own.filter(|it| it.0.starts_with(of)) {
+        let Some(certified) = &it.certified else {
+            continue;
+        };
+        let standing = certified.standing(today, it.remind_days);
+        if standing.is_refused() {
+            return Err(Failure::NotCertified {
+                key,
+                file: it.file.clone(),
+                standing: standing.to_string(),
+                help: standing.help(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The failure of a verb whose section of the configuration is missing.

@@ -1,35 +1,22 @@
 //! Why a calibration makes an axis worse: by how what is left looks like what the calibration takes away.
 
-use compensator::error_table::Compensation;
-use compensator::iso230::Figures;
-use units::{Approach, Metres};
-
 /// So alike two curves are one and the same, but for a factor.
 const ALIKE: f64 = 0.95;
 
-/// What probably is wrong, for a person.
-pub(super) fn likely_cause(used: &Compensation, left: &Figures) -> String {
-    let pairs = left.targets.iter().flat_map(|it| {
-        let sides = [
-            (Approach::Forward, it.mean_forward),
-            (Approach::Reverse, it.mean_reverse),
-        ];
-        sides.map(|(approach, seen)| Some((used.deviation(it.target, approach).ok()?, seen)))
-    });
-    told(likeness(&pairs.flatten().collect::<Vec<_>>()))
+/// What probably is wrong, for a person: of each place what the calibration says of it, and what is left there.
+pub(crate) fn likely_cause(pairs: &[(f64, f64)]) -> String {
+    told(likeness(pairs))
 }
 
 /// By which factor what is left follows what the calibration says, and how closely (their correlation); `None` where
 /// either has no shape.
-fn likeness(pairs: &[(Metres, Metres)]) -> Option<(f64, f64)> {
+fn likeness(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let count = pairs.len() as f64;
-    let mean = |of: fn(&(Metres, Metres)) -> Metres| {
-        pairs.iter().map(|it| of(it).value()).sum::<f64>() / count
-    };
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
     let (used, left) = (mean(|it| it.0), mean(|it| it.1));
     let (mut of_used, mut of_left, mut of_both) = (0.0, 0.0, 0.0);
     for pair in pairs {
-        let (x, y) = (pair.0.value() - used, pair.1.value() - left);
+        let (x, y) = (pair.0 - used, pair.1 - left);
         of_used += x * x;
         of_left += y * y;
         of_both += x * y;
@@ -78,7 +65,7 @@ mod tests {
         let pairs = (0..20).map(|at| {
             let noise = 0.05 * (f64::from(at * 7919 % 11) - 5.0);
             let (used, left) = (says(at), curve(at) - says(at) + noise);
-            (Metres::from_um(used), Metres::from_um(left))
+            (used, left)
         });
         let told = told(likeness(&pairs.collect::<Vec<_>>()));
         assert!(told.contains(cause), "{told}");

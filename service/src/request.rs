@@ -237,6 +237,12 @@ pub struct RunRequest {
     /// Calibrate: save although the same place measured at the beginning and at the end differs too much.
     #[serde(default)]
     pub accept_drift: bool,
+    /// Calibrate: store what is found, and use what was used before.
+    #[serde(default)]
+    pub aside: bool,
+    /// Calibrate: verify with it at once; where it makes things worse, what was used before is used again.
+    #[serde(default)]
+    pub verify: bool,
     /// Verify: without the calibration, the stage as found. Path: by the encoders alone.
     #[serde(default)]
     pub uncompensated: bool,
@@ -273,6 +279,8 @@ impl RunRequest {
             kind,
             axis: axis.map(str::to_owned),
             accept_drift: false,
+            aside: false,
+            verify: false,
             uncompensated: false,
             warm_up_min: None,
             path: None,

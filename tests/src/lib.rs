@@ -5,6 +5,7 @@
 //! SocketCAN interface `vcan0`, serial lines still on pseudo-terminals.
 
 pub mod apart;
+pub mod certificate;
 mod coverage;
 pub mod cycles;
 mod desk;

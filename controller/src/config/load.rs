@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::certificates;
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
@@ -17,6 +18,7 @@ use super::structure::{self, Part};
 use super::syntax;
 use super::validate::{Finding, validate};
 use super::warnings;
+use crate::certificate;
 use machine::Patience;
 
 /// A configuration that was read and judged sound.
@@ -30,6 +32,8 @@ pub struct Loaded {
     pub warnings: Vec<Diagnostic>,
     /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
     pub unfilled: Vec<Diagnostic>,
+    /// Certificates that have ended, or are of a day to come: nothing is measured with what they certify.
+    pub(crate) ended: Vec<Diagnostic>,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
     /// own pauses do not shrink, so its time-outs must bear them.
@@ -46,10 +50,10 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
         path: path.to_owned(),
         source,
     })?;
-    let mut loaded = parse(&text, &path.display().to_string())?;
     // Relative to the file, not to whoever calls: from another folder the machine must find the
     // same calibrations and take the same lease.
     let folder = path.parent().unwrap_or(Path::new(""));
+    let mut loaded = parse_at(&text, &path.display().to_string(), Some(folder))?;
     let section = &mut loaded.config.machine;
     section.data_dir = folder.join(&section.data_dir);
     Ok(loaded)
@@ -74,11 +78,24 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
-    let config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
-    let warnings = warnings::of(&config).into_iter();
+    parse_at(text, file, None)
+}
+
+/// Likewise of a file whose folder is known: the paths of its certificates count from there.
+fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, ConfigError> {
+    let mut config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
+    let mut findings = Vec::new();
+    certificate::read(config.certificates_mut(), folder, &mut findings);
+    let at_values = |it: Vec<Finding>| it.into_iter().map(|it| (it, Part::Value));
+    if !findings.is_empty() {
+        return Err(invalid(text, file, at_values(findings).collect()));
+    }
+    let mut warnings = warnings::of(&config);
+    let ended = certificates::judged(&config, certificate::today(), &mut warnings);
     Ok(Loaded {
         hash: hash_of(&config),
-        warnings: placed(text, file, warnings.map(|it| (it, Part::Value))),
+        warnings: placed(text, file, at_values(warnings)),
+        ended: placed(text, file, at_values(ended)),
         unfilled: lines::unfilled(text, file),
         config,
         patience: Patience::NONE,
@@ -86,6 +103,15 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
 }
 
 impl Loaded {
+    /// Whether all its certificates hold.
+    ///
+    /// # Errors
+    /// Names each that does not.
+    #[cfg(feature = "program")]
+    pub(crate) fn certified(&self) -> Result<(), ConfigError> {
+        filled_in(&self.ended)
+    }
+
     /// Whether it is a machine's own throughout.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 //! in its name. [`load`] reads and judges a file without touching any bus.
 
 mod axis;
+mod certificates;
 pub(crate) mod dependence;
 #[cfg(any(feature = "program", test))]
 mod described;

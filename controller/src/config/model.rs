@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::axis::AxisConfig;
+use crate::certificate::{CertificateConfig, Measurand, Named};
 use crate::hardware::analog::AnalogConfig;
 use crate::hardware::bus::{CanBus, SerialLine, Wiring};
 use crate::hardware::camera::CameraConfig;
@@ -77,6 +78,28 @@ impl MachineConfig {
             can: &self.can,
             serial: &self.serial,
         }
+    }
+
+    /// Its certificates, to be read.
+    pub(crate) fn certificates_mut(&mut self) -> Vec<Named<'_>> {
+        let instruments = self.instrument.iter_mut();
+        let instruments = instruments.flat_map(|(name, it)| it.certificates_mut(name));
+        let volumetric = self.volumetric.iter_mut();
+        let thermometers = volumetric.flat_map(VolumetricConfig::certificates_mut);
+        instruments.chain(thermometers).collect()
+    }
+
+    /// Its certificates by their keys, once they have been read.
+    pub(crate) fn certificates(&self) -> Vec<(String, Measurand, &CertificateConfig)> {
+        let instruments = self.instrument.iter().flat_map(|(name, it)| {
+            let own = it.certificates().into_iter();
+            own.map(move |(of, measurand, it)| {
+                (format!("instrument.{name}.certificate.{of}"), measurand, it)
+            })
+        });
+        let volumetric = self.volumetric.iter();
+        let thermometers = volumetric.flat_map(VolumetricConfig::certificates);
+        instruments.chain(thermometers).collect()
     }
 
     /// How long a picture of the slowest camera that sees a beam may take; nothing without one.

@@ -24,6 +24,7 @@ impl Failure {
             | Self::Series(_)
             | Self::SearchSettings { .. }
             | Self::File { .. }
+            | Self::NotCertified { .. }
             | Self::Usage { .. }
             | Self::Store(
                 StoreError::Io { .. }

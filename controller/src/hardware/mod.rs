@@ -8,6 +8,7 @@
 pub(crate) mod analog;
 pub(crate) mod bus;
 pub(crate) mod camera;
+pub(crate) mod certificate;
 pub(crate) mod drive;
 pub(crate) mod instrument;
 pub(crate) mod node;

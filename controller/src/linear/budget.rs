@@ -73,7 +73,8 @@ impl LinearStage<'_> {
         })?;
         let first = measured.points.first().map(|it| it.environment);
         let first = first.map_or(mean, |it| environment(&it));
-        let made = made.into_iter().map(|(_, it)| it);
+        let made = made.into_iter().map(|it| instrument.named(it));
+        let made = made.chain(instrument.scale_contribution());
         Ok(made.chain(left_out(instrument, &first, &mean)).collect())
     }
 

@@ -34,11 +34,7 @@ impl LinearStage<'_> {
         self.core.use_instrument(&plan.instrument)?;
         self.go_to_datum(&plan)?;
         let reading = self.read_displacement(&plan)?;
-        let environment = self
-            .core
-            .devices()
-            .instrument(&plan.instrument)?
-            .environment();
+        let environment = self.core.environment_of(&plan.instrument)?;
         self.core.leave_instrument();
         self.correct(&plan, &reading, &environment, &datum)
     }
@@ -61,13 +57,7 @@ impl LinearStage<'_> {
         let reverse = if self.go_to_datum_in_reverse(plan)? {
             let reading = self.read_calm(plan)?;
             self.go_to_datum(plan)?;
-            Some((
-                reading,
-                self.core
-                    .devices()
-                    .instrument(&plan.instrument)?
-                    .environment(),
-            ))
+            Some((reading, self.core.environment_of(&plan.instrument)?))
         } else {
             None
         };
@@ -86,11 +76,9 @@ impl LinearStage<'_> {
     }
 
     fn length_correction(&mut self, plan: &RunPlan) -> Result<LengthCorrection, Failure> {
-        let environment = self
-            .core
-            .devices()
-            .instrument(&plan.instrument)?
-            .environment();
+        self.core
+            .tell_beyond_certified(&plan.instrument, &plan.targets)?;
+        let environment = self.core.environment_of(&plan.instrument)?;
         let config = &self.core.config.instrument[&plan.instrument];
         let environment = assemble::correction_environment(&environment);
         LengthCorrection::new(config.corrections(), &environment).map_err(|source| {
@@ -155,10 +143,12 @@ impl LinearStage<'_> {
             source,
         };
         let environment = assemble::correction_environment(environment);
-        datum
+        let corrected = datum
             .length
             .correct(reading.vacuum - datum.offset, &environment)
-            .map(|corrected| corrected.displacement)
-            .map_err(failed)
+            .map_err(failed)?;
+        let instrument = &self.core.config.instrument[&plan.instrument];
+        let displacement = corrected.displacement;
+        Ok(displacement + instrument.scale_correction(displacement))
     }
 }

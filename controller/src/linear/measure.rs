@@ -329,7 +329,7 @@ impl LinearStage<'_> {
     /// The environment, as long as its sensors can be believed.
     fn watched_environment(&self, session: &mut Session<'_>) -> Result<Environment, Failure> {
         let instrument = &session.plan.instrument;
-        let environment = self.core.devices().instrument(instrument)?.environment();
+        let environment = self.core.environment_of(instrument)?;
         let Some(watch) = &mut session.watch else {
             return Ok(environment);
         };

@@ -40,7 +40,6 @@ mod told;
 mod travel;
 pub(crate) mod verify;
 mod warnings;
-mod worse;
 pub(crate) mod zero;
 pub(crate) mod zero_budget;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use compensator::budget::Combined;
-use compensator::error_table::ErrorTable;
+use compensator::error_table::{Compensation, ErrorTable};
 use compensator::iso230::{self, Figures};
 use units::{Approach, Metres};
 
@@ -13,10 +13,10 @@ use crate::linear::measure::{MeasureOptions, Measured};
 use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
-use crate::linear::worse::likely_cause;
 use crate::linear::{CriterionEntry, LinearEntry};
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
+use crate::worse::likely_cause;
 use machine::Stage;
 
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
@@ -166,7 +166,7 @@ impl LinearStage<'_> {
         if verified.is_within_tolerance() || after <= before {
             return Ok(());
         }
-        let cause = likely_cause(compensation, &verified.figures);
+        let cause = likely_cause(&pairs(compensation, &verified.figures));
         let in_use = self.fall_back(store, calibration)?;
         Err(Failure::MadeWorse {
             axis: self.axis.to_owned(),
@@ -210,6 +210,21 @@ fn criterion(tolerance: Metres, uncertainty: &[UncertaintyAtTarget]) -> Criterio
         tolerance_m: tolerance.value(),
         targets: uncertainty.iter().map(record).collect(),
     }
+}
+
+/// Of each target what the calibration says of it, and what is left there.
+fn pairs(used: &Compensation, left: &Figures) -> Vec<(f64, f64)> {
+    let pairs = left.targets.iter().flat_map(|it| {
+        let sides = [
+            (Approach::Forward, it.mean_forward),
+            (Approach::Reverse, it.mean_reverse),
+        ];
+        sides.map(|(approach, seen)| {
+            let says = used.deviation(it.target, approach).ok()?;
+            Some((says.value(), seen.value()))
+        })
+    });
+    pairs.flatten().collect()
 }
 
 /// The range of the deviations that a table takes away, both approaches together.

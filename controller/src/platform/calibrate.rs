@@ -22,7 +22,7 @@ use crate::platform::look::Seen;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
-use crate::run::{note_failure, utc_now};
+use crate::run::{CalibrateOptions, note_failure, utc_now};
 use crate::store::ClosureEntry;
 use crate::store::{CalibrationRecord, Journal, RecordHead, Store};
 use machine::Stage;
@@ -81,6 +81,8 @@ pub struct PlatformCalibrated {
     pub journal: PathBuf,
     /// How far the largest of the strokes was off at zero after everything.
     pub closure: Metres,
+    /// Whether they are used from now on.
+    pub is_in_use: bool,
 }
 
 impl AlignmentPlatform<'_> {
@@ -91,6 +93,18 @@ impl AlignmentPlatform<'_> {
     /// Not zeroed, whatever stops the machine, a datum that drifted, strokes that give no
     /// model, or a model beyond the limits. Nothing is activated then.
     pub fn calibrate(&mut self, store: &Store) -> Result<PlatformCalibrated, Failure> {
+        self.calibrate_by(store, &CalibrateOptions::default())
+    }
+
+    /// The same; with `options.aside` what is found is stored only, and what was used before is used still.
+    ///
+    /// # Errors
+    /// As [`Self::calibrate`].
+    pub fn calibrate_by(
+        &mut self,
+        store: &Store,
+        options: &CalibrateOptions,
+    ) -> Result<PlatformCalibrated, Failure> {
         self.require_zeroed()?;
         let missing = |section| PlatformFailure::NotConfigured { section };
         let config = self.config;
@@ -106,6 +120,9 @@ impl AlignmentPlatform<'_> {
             .measure_screws(&plan, &mut journal, &mut sightings)
             .and_then(|(strokes, closure)| {
                 let screws = self.fit_and_store(store, &journal, &plan, &strokes)?;
+                if !options.aside {
+                    self.use_screws(store, &screws)?;
+                }
                 Ok((screws, closure))
             });
         let (screws, closure) = done
@@ -116,6 +133,7 @@ impl AlignmentPlatform<'_> {
             screws,
             journal: journal.path().to_owned(),
             closure,
+            is_in_use: !options.aside,
         })
     }
 
@@ -352,7 +370,11 @@ impl AlignmentPlatform<'_> {
                 content,
             });
         }
-        // Only when all of them are on the disk.
+        Ok(calibrated)
+    }
+
+    /// Only when all of them are on the disk.
+    fn use_screws(&mut self, store: &Store, calibrated: &[ScrewCalibrated]) -> Result<(), Failure> {
         for (at, screw) in calibrated.iter().enumerate() {
             store.activate(&screw.axis, &screw.id)?;
             let compensation = self.prepare_screw(at, screw.model.clone())?;
@@ -360,7 +382,7 @@ impl AlignmentPlatform<'_> {
             state.compensation = Some(compensation);
             state.calibration = Some(screw.id.clone());
         }
-        Ok(calibrated)
+        Ok(())
     }
 
     /// The screws for which `store` has no active calibration. Asks no device.

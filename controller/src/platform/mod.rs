@@ -6,6 +6,7 @@
 //! at their zero, reached forward.
 
 mod agreement;
+mod benefit;
 pub(crate) mod calibrate;
 mod causes;
 pub(crate) mod check;

@@ -61,7 +61,7 @@ impl AlignmentPlatform<'_> {
         check_pose_of((self.config, &self.state.kinematics), target)
     }
 
-    fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
+    pub(super) fn strokes_to(&self, target: Pose) -> Result<Vec<Metres>, Failure> {
         let strokes = self.state.kinematics.check(target);
         Ok(strokes.map_err(PlatformFailure::from)?)
     }

@@ -84,7 +84,7 @@ fn planned(machine: &mut Machine, _: &str, task: &Task) -> Result<Planned, Failu
 
 fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
     match task.stage {
-        Stage::Calibrate => calibrate(work),
+        Stage::Calibrate => calibrate(work, task),
         Stage::Verify => verify(work, task),
         Stage::Zero | Stage::Reference | Stage::Job => zero(work),
     }
@@ -106,9 +106,13 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
     })
 }
 
-fn calibrate(work: Work<'_>) -> Result<Found, Failure> {
+fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
     let words = work.words::<PlatformTeller>();
-    let made = work.machine.platform()?.calibrate(work.store)?;
+    let options = task.calibrate_options();
+    let made = work
+        .machine
+        .platform()?
+        .calibrate_by(work.store, &options)?;
     Ok(Found {
         figures: json!({
             "screws": made.screws.len(),

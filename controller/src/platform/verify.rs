@@ -31,6 +31,8 @@ pub struct PoseChecked {
     pub error: Metres,
     /// From the start of the first screw to that of the last, seconds.
     pub skew_s: Option<f64>,
+    /// The error that the screws' calibrations took away, as far as they know it.
+    pub(crate) known: Option<Pose>,
 }
 
 impl PoseChecked {
@@ -41,6 +43,7 @@ impl PoseChecked {
             seen,
             error: largest_error(difference(seen, target), edge),
             skew_s,
+            known: None,
         }
     }
 }
@@ -110,7 +113,8 @@ pub struct Aligned {
 
 impl AlignmentPlatform<'_> {
     /// Visits the configuration's verification poses, moving open loop, and looks at each.
-    /// Being out of tolerance is a result here, not an error.
+    /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
+    /// than without the calibrations is one, and takes them out of use.
     ///
     /// # Errors
     /// Not zeroed, `compensated` without a calibration, and whatever stops the machine.
@@ -143,14 +147,18 @@ impl AlignmentPlatform<'_> {
             rms,
             skew_max_s,
         } = PoseFigures::of(&checked);
-        Ok(PlatformVerified {
+        let verified = PlatformVerified {
             largest,
             rms,
             skew_max_s,
             tolerance,
             journal: journal.path().to_owned(),
             poses: checked,
-        })
+        };
+        if compensated {
+            self.judge_benefit(store, &verified)?;
+        }
+        Ok(verified)
     }
 
     fn check_poses(
@@ -178,7 +186,13 @@ impl AlignmentPlatform<'_> {
                 skew_s,
                 at_s: self.core.now().seconds(),
             }))?;
-            checked.push(PoseChecked::new(*target, seen, edge, skew_s));
+            let known = compensated
+                .then(|| self.known_error(*target, &moved))
+                .flatten();
+            checked.push(PoseChecked {
+                known,
+                ..PoseChecked::new(*target, seen, edge, skew_s)
+            });
             let total = targets.len() as u64;
             self.core
                 .observer()

@@ -71,20 +71,20 @@ impl Service {
         asked: Vec<&'static Asked>,
         output: Output,
     ) -> Ended {
-        refuse(args.no_activate, "--no-activate")?;
-        refuse(args.verify, "--verify")?;
         refuse(!args.readings.is_empty(), "--readings")?;
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({
             "axis": args.axis.axis,
             "accept_drift": args.accept_drift,
             "warm_up_min": args.warm_up_min,
+            "aside": args.no_activate,
+            "verify": args.verify,
         });
         let resume = args.resume.as_deref();
         let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
         let waiting = waiting.who_asks(asked);
         let run = self.run(Stage::Calibrate, request, resume, waiting)?;
-        tell(&run, output)
+        told_of(&run, output)
     }
 
     pub(crate) fn verify(
@@ -100,16 +100,7 @@ impl Service {
         let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
         let waiting = waiting.who_asks(asked);
         let run = self.run(Stage::Verify, request, resume, waiting)?;
-        let Some(exit_code) = exit_code_of(&run["out_of_tolerance"]) else {
-            return tell(&run, output);
-        };
-        let said = plain(
-            run["out_of_tolerance"]["cause"]
-                .as_str()
-                .unwrap_or_default(),
-        );
-        let (text, value) = words_of(&run);
-        output.bad_result(&text, value, Failure::Kept { said, exit_code })
+        told_of(&run, output)
     }
 
     /// Uses another calibration from now on.
@@ -435,4 +426,17 @@ fn words_of(ended: &Value) -> (String, Value) {
 fn tell(ended: &Value, output: Output) -> Ended {
     let (text, value) = words_of(ended);
     output.result(&text, &value)
+}
+/// What a run gave, and why that is a bad result, if it is.
+fn told_of(run: &Value, output: Output) -> Ended {
+    let Some(exit_code) = exit_code_of(&run["out_of_tolerance"]) else {
+        return tell(run, output);
+    };
+    let said = plain(
+        run["out_of_tolerance"]["cause"]
+            .as_str()
+            .unwrap_or_default(),
+    );
+    let (text, value) = words_of(run);
+    output.bad_result(&text, value, Failure::Kept { said, exit_code })
 }

@@ -52,6 +52,7 @@ mod stored_tests;
 mod targets;
 mod text;
 mod token;
+mod tried;
 mod verbs;
 mod volumetric;
 
@@ -267,10 +268,10 @@ struct CalibrateArgs {
     ask: AskArgs,
     #[command(flatten)]
     readings: ReadingsArgs,
-    /// Store what is found, and use what was used before (linear axes).
+    /// Store what is found, and use what was used before.
     #[arg(long, conflicts_with = "verify")]
     no_activate: bool,
-    /// Verify with it at once, and go back to what was used before where it makes the axis worse (linear axes).
+    /// Verify with it at once, and go back to what was used before where it makes things worse.
     #[arg(long)]
     verify: bool,
     /// Three axes: let them move to and fro for this long, then measure again what heat changed.
@@ -347,11 +348,18 @@ impl AgreedArgs {
 }
 
 impl CalibrateArgs {
-    /// # Errors
-    /// When a calibration of another kind is to be kept aside, or verified at once.
-    fn only_made(&self) -> Result<(), crate::Failure> {
-        only_for("--no-activate", "linear axes", self.no_activate)?;
-        only_for("--verify", "linear axes", self.verify)
+    /// What becomes of what is found.
+    const fn then(&self) -> &'static str {
+        tried::then(self.no_activate)
+    }
+
+    /// How it is made, by this journal if it goes on with one.
+    fn options(&self, resume: Option<PathBuf>) -> CalibrateOptions {
+        CalibrateOptions {
+            resume,
+            accept_drift: self.accept_drift,
+            aside: self.no_activate,
+        }
     }
 }
 
@@ -402,6 +410,7 @@ fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failu
     }
 }
 
+use crate::run::CalibrateOptions;
 use serve::Network;
 pub use serve::Serving;
 use token::NewToken;

@@ -40,11 +40,13 @@ pub struct RotaryCalibrated {
     pub scatter: Option<Radians>,
     /// What was stored.
     pub content: RotaryContent,
+    /// Whether it is used from now on.
+    pub is_in_use: bool,
 }
 
 impl RotaryTable<'_> {
     /// Reads the plate in every placement, which `operator` brings about, evaluates the table's
-    /// error, stores and activates it, and uses it from now on.
+    /// error, stores and activates it, and uses it from now on, unless it is to be kept aside.
     ///
     /// # Errors
     /// Not zeroed, or no line detector; whatever stops the machine; a plate that slipped or lies
@@ -81,7 +83,9 @@ impl RotaryTable<'_> {
             self.memory.plate_at = None;
         })?;
         let (calibrated, in_use) = it.store(store, solution)?;
-        self.memory.calibration = Some(in_use);
+        if calibrated.is_in_use {
+            self.memory.calibration = Some(in_use);
+        }
         Ok(calibrated)
     }
 
@@ -108,6 +112,8 @@ pub(crate) struct Calibration<'a> {
     pub(super) subject: Subject<'a>,
     pub(super) run: PlateRun,
     amplification_limit: f64,
+    /// Whether what is found is used.
+    is_used: bool,
     offsets: Vec<f64>,
     pub(super) journal: PlateJournal,
     placed: Vec<Placed>,
@@ -133,6 +139,7 @@ impl<'a> Calibration<'a> {
         Ok(Self {
             placed: journal.placed(),
             amplification_limit: config.amplification_limit,
+            is_used: !options.aside,
             subject,
             run,
             offsets,
@@ -188,7 +195,7 @@ impl<'a> Calibration<'a> {
         Ok(evaluate(axis, &self.run, limit, &self.placed)?)
     }
 
-    /// Stores what the readings say, and activates it.
+    /// Stores what the readings say, and activates it unless it is to be kept aside.
     pub(super) fn store(
         mut self,
         store: &Store,
@@ -220,6 +227,7 @@ impl<'a> Calibration<'a> {
                 .filter_map(|it| it.scatter)
                 .reduce(Radians::max),
             content,
+            is_in_use: self.is_used,
         };
         Ok((calibrated, in_use))
     }
@@ -240,7 +248,9 @@ impl<'a> Calibration<'a> {
         let compensation = self.subject.prepare(&content, "just made")?;
         let record = CalibrationRecord { head, content };
         let id = store.save(&record)?;
-        store.activate(self.subject.axis, &id)?;
+        if self.is_used {
+            store.activate(self.subject.axis, &id)?;
+        }
         let in_use = TableInUse::new(&id, &record, compensation)?;
         Ok((id, in_use))
     }

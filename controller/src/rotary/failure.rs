@@ -5,6 +5,7 @@ use compensator::rotary::{
 };
 use units::Radians;
 
+use crate::failure::in_use_text;
 use crate::failure::of_kind::KindFailure;
 
 /// Why a rotary table did not do what it was asked.
@@ -139,8 +140,8 @@ pub enum RotaryFailure {
     /// With its calibration the table is worse than without; it is not used any more.
     #[error(
         "axis {axis}: CALIBRATION {calibration} MAKES THE TABLE WORSE: deviation {:.3} arcsec rms \
-         with it, {:.3} without; it was taken out of use: was the encoder moved since it was made?",
-        after.arcsec(), before.arcsec()
+         with it, {:.3} without; {cause}, or the encoder was moved since. It was taken out of use; {}",
+        after.arcsec(), before.arcsec(), in_use_text(in_use.as_deref())
     )]
     MadeWorse {
         /// Which axis.
@@ -151,6 +152,10 @@ pub enum RotaryFailure {
         before: Radians,
         /// With it.
         after: Radians,
+        /// What probably is wrong with it.
+        cause: String,
+        /// The calibration that is used again.
+        in_use: Option<String>,
     },
     /// A verification is out of tolerance.
     #[error(

@@ -31,6 +31,7 @@ use crate::rotary::table::RotaryTable;
 use crate::rotary::{JudgedEntry, PlateEntry, RotaryVerifyConfig};
 use crate::run::missing;
 use crate::store::{Store, short};
+use crate::worse::likely_cause;
 use machine::Stage;
 
 /// How much better another place of the plate must fit.
@@ -308,16 +309,31 @@ fn judge_table(
         return Ok(());
     }
     let id = known.map(|it| it.id.clone());
-    if id.is_some() && store.active(axis)?.current == id {
-        store.retire(axis)?;
-    }
+    let in_use = match id.is_some() && store.active(axis)?.current == id {
+        true => store.retire(axis)?,
+        false => None,
+    };
+    let pairs = known.map(|it| pairs(&it.compensation, left));
     Err(RotaryFailure::MadeWorse {
+        cause: likely_cause(&pairs.unwrap_or_default()),
+        in_use: in_use.as_deref().map(short),
         axis: axis.to_owned(),
         calibration: id.as_deref().map(short).unwrap_or_default(),
         before: verified.found.rms,
         after: left.rms,
     }
     .into())
+}
+
+/// Of each line what the calibration says of its place, and what is left there.
+fn pairs(used: &PeriodicCompensation, left: &RotaryFigures) -> Vec<(f64, f64)> {
+    let lines = left.deviations.len() as f64;
+    let numbered = left.deviations.iter().enumerate();
+    let pairs = numbered.filter_map(|(line, left)| {
+        let says = used.deviation(Radians(TAU * line as f64 / lines)).ok()?;
+        Some((says.value(), (*left)?.value()))
+    });
+    pairs.collect()
 }
 
 /// Whether the calibration was made with the plate that is to be read.

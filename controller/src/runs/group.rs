@@ -151,6 +151,20 @@ impl Group {
             teller,
         };
         let mut found = (self.runs.perform)(work, &self.name, task)?;
+        if let Some(then) = task.then() {
+            let work = Work {
+                machine,
+                store,
+                person,
+                teller,
+            };
+            match (self.runs.perform)(work, &self.name, &then) {
+                Ok(verified) => found.verified(verified),
+                // It has come to its end at rest: what was stored is told, and why it is not used.
+                Err(failure) if failure.is_of_result() => found.bad = Some(failure),
+                Err(failure) => return Err(failure),
+            }
+        }
         if let (Some(told), Some(teller)) = (&mut found.told, teller) {
             told.value["counters"] = (teller.counters)(machine);
         }

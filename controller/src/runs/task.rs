@@ -24,6 +24,10 @@ pub struct Task {
     pub resume: Option<PathBuf>,
     /// Calibrate: store although the same place differs too much between beginning and end.
     pub accept_drift: bool,
+    /// Calibrate: store what is found, and use what was used before.
+    pub aside: bool,
+    /// Calibrate: verify with it at once; where it makes things worse, what was used before is used again.
+    pub verify: bool,
     /// Verify: as found, without the calibration. A path: by the encoders alone.
     pub uncompensated: bool,
     /// Calibrate three axes: they warm up for so many minutes, and what that changes is measured again.
@@ -43,6 +47,8 @@ impl Task {
             stage,
             resume: None,
             accept_drift: false,
+            aside: false,
+            verify: false,
             uncompensated: false,
             warm_up_min: None,
             path: None,
@@ -63,12 +69,26 @@ impl Task {
         }
     }
 
+    /// The verification of what it has made; `None` where none is wanted.
+    pub(super) fn then(&self) -> Option<Self> {
+        let is_verified = self.verify && !self.aside && self.stage == Stage::Calibrate;
+        is_verified.then(|| Self {
+            stage: Stage::Verify,
+            resume: None,
+            accept_drift: false,
+            uncompensated: false,
+            verify: false,
+            warm_up_min: None,
+            ..self.clone()
+        })
+    }
+
     /// The same for a verb that calibrates one axis.
     pub(crate) fn calibrate_options(&self) -> CalibrateOptions {
         CalibrateOptions {
             resume: self.resume.clone(),
             accept_drift: self.accept_drift,
-            ..CalibrateOptions::default()
+            aside: self.aside,
         }
     }
 }
@@ -85,6 +105,17 @@ impl Work<'_> {
     /// The words of the kind whose they are, where somebody wants to be told.
     pub(crate) fn words<W: Any>(&self) -> Option<&'static W> {
         self.teller?.of()
+    }
+}
+
+impl Found {
+    /// With what the verification of a calibration found.
+    pub(super) fn verified(&mut self, verified: Self) {
+        self.figures["verified"] = verified.figures;
+        if let (Some(told), Some(then)) = (&mut self.told, verified.told) {
+            told.append_verified(then);
+        }
+        self.bad = verified.bad;
     }
 }
 

@@ -16,6 +16,14 @@ pub struct Told {
     pub value: Value,
 }
 
+impl Told {
+    /// With the verification of what it tells of.
+    pub(crate) fn append_verified(&mut self, then: Self) {
+        self.text += &format!("\n{}", then.text);
+        self.value["verified"] = then.value;
+    }
+}
+
 /// What one kind has to say: a struct of functions of its own.
 pub(crate) type Words = &'static (dyn Any + Send + Sync);
 

@@ -4,6 +4,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::certificate::{CertificateConfig, Measurand, Named};
+
 mod detectors;
 mod one_or_more;
 
@@ -81,11 +83,39 @@ pub struct VolumetricConfig {
     pub compensation: VolumetricCompensationConfig,
 }
 
+/// Where the certificate of a thermometer stands in the file.
+fn of_thermometer(at: usize) -> String {
+    format!("volumetric.temperature.{at}.certificate")
+}
+
 impl VolumetricConfig {
     /// The roll detectors of x, y and z.
     pub fn rolls(&self) -> [Option<&RollConfig>; 3] {
         let axes = [VolumeAxisName::X, VolumeAxisName::Y, VolumeAxisName::Z];
         axes.map(|axis| self.roll.each().iter().find(|it| it.axis == axis))
+    }
+
+    /// The certificates of its thermometers, to be read.
+    pub(crate) fn certificates_mut(&mut self) -> impl Iterator<Item = Named<'_>> {
+        let each = self.temperature.iter_mut().enumerate();
+        each.filter_map(|(at, it)| {
+            Some(Named {
+                key: of_thermometer(at),
+                measurand: Measurand::Temperature,
+                config: it.certificate.as_mut()?,
+            })
+        })
+    }
+
+    /// The same by their keys, once they have been read.
+    pub(crate) fn certificates(
+        &self,
+    ) -> impl Iterator<Item = (String, Measurand, &CertificateConfig)> {
+        let each = self.temperature.iter().enumerate();
+        each.filter_map(|(at, it)| {
+            let own = it.certificate.as_ref()?;
+            Some((of_thermometer(at), Measurand::Temperature, own))
+        })
     }
 
     /// The cameras that see beams.

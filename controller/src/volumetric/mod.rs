@@ -19,6 +19,7 @@
 //! | `thermometers` | the same for the thermometers; those that belong together fail together |
 
 mod asked;
+mod benefit;
 pub(crate) mod calibrate;
 pub(crate) mod check;
 mod chosen;

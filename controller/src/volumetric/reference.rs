@@ -130,11 +130,12 @@ impl WorkVolume<'_> {
         }
         let references = self.take_references()?;
         check_warmth(&config, &geometry, &then, &references.temperatures)?;
-        self.keep_references(store, &geometry, references, "reference")
+        let kept = self.keep_references(store, &geometry, references, "reference")?;
+        store.activate(REFERENCES, &kept.id)?;
+        Ok(kept)
     }
 
-    /// Stores `references`, which come from `source`, as those of the errors called `geometry`, and
-    /// activates them.
+    /// Stores `references`, which come from `source`, as those of the errors called `geometry`.
     pub(super) fn keep_references(
         &self,
         store: &Store,
@@ -150,7 +151,6 @@ impl WorkVolume<'_> {
         };
         let content = references.content.clone();
         let id = store.save(&CalibrationRecord { head, content })?;
-        store.activate(REFERENCES, &id)?;
         Ok(VolumetricReferenced { id, references })
     }
 

@@ -198,10 +198,10 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
 
 fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
     let words = work.words::<VolumetricTeller>();
-    let (store, resume) = (work.store, task.resume.as_deref());
+    let (store, options) = (work.store, task.calibrate_options());
     let mut volume = work.machine.volumetric()?;
     let warm_up = warm_up_of(task)?;
-    let made = volume.calibrate(store, warm_up, resume, &mut Asking(work.person))?;
+    let made = volume.calibrate_by(store, warm_up, &options, &mut Asking(work.person))?;
     Ok(Found {
         figures: json!({
             "geometry": made.id,

@@ -2,11 +2,14 @@
 //! their trouble: when one of them says nothing, all of them hold, fade or stop, and they come back
 //! together. If one of a pair faded alone, it would leave a gradient that does not exist.
 
+use std::sync::Arc;
+
 use compensator::volumetric::model::{Thermal, ThermalChannel};
 use compensator::volumetric::online::{Feed, FeedStatus, TemperatureChannel, Trouble};
 use units::portable::hypot;
 use units::{Celsius, Time};
 
+use crate::certificate::Certified;
 use crate::config::MachineConfig;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::inputs::{confirmed_by_samples, place_of_temperature};
@@ -20,11 +23,18 @@ fn newest(seen: &[Option<ThermometerSample>], place: usize) -> Option<(Time, Cel
     newest.map(|it| (it.at, it.celsius.unwrap_or(Celsius(f64::NAN))))
 }
 
+/// What it shows, with what its certificate corrects.
+fn right(shown: Celsius, certified: Option<&Certified>) -> Celsius {
+    let correction = certified.map_or(0.0, |it| it.figures.correction(shown.value()));
+    Celsius(shown.value() + correction)
+}
+
 /// A thermometer that is believed only while it shows what can be.
 #[derive(Clone, Debug)]
 pub(super) struct Reader {
     place: usize,
     channel: TemperatureChannel,
+    certified: Option<Arc<Certified>>,
 }
 
 impl Reader {
@@ -32,6 +42,7 @@ impl Reader {
         Self {
             place: place_of_temperature(config, &temperature.analog, temperature.channel),
             channel: TemperatureChannel::new(temperature_settings(temperature)),
+            certified: temperature.certified(),
         }
     }
 
@@ -41,7 +52,9 @@ impl Reader {
         now: Time,
         seen: &[Option<ThermometerSample>],
     ) -> Result<Celsius, Trouble> {
-        self.channel.read(now, newest(seen, self.place))
+        let newest = newest(seen, self.place);
+        let newest = newest.map(|(at, it)| (at, right(it, self.certified.as_deref())));
+        self.channel.read(now, newest)
     }
 }
 

@@ -55,6 +55,8 @@ pub struct VolumetricVerifiedPoint {
     pub deviation: Metres,
     /// Standard uncertainty of the reading.
     pub u: Metres,
+    /// The deviation along the line that the correction took away, counted from that at its beginning.
+    pub(crate) known: Option<Metres>,
 }
 
 /// What the line showed.
@@ -147,7 +149,8 @@ impl WorkVolume<'_> {
         Ok(own.ok_or(VolumetricFailure::NotConfigured { section })?)
     }
 
-    /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says.
+    /// Reads the line of `[volumetric.verify]` by interferometer, corrected as `by` says. A calibration by which it
+    /// is out of tolerance and worse than without is taken out of use.
     ///
     /// # Errors
     /// When nothing is stored, the line cannot be set up or read, or anything stops the machine.
@@ -160,7 +163,7 @@ impl WorkVolume<'_> {
         let config = self.config.clone();
         let own = self.verify_config()?;
         let (mover, geometry) = self.mover_by(store, by)?;
-        let header = self.header("verify", geometry)?;
+        let header = self.header("verify", geometry.clone())?;
         let mut journal = Journal::create(&store.runs(), &header)?;
         journal.write(&VolumeEntry::VolumeCheck(VolumeCheckEntry {
             state: by.text().to_owned(),
@@ -174,7 +177,9 @@ impl WorkVolume<'_> {
             .inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
         let path = journal.path().to_owned();
-        Ok(judged(points, Metres::from_um(own.limit_um), path))
+        let verified = judged(points, Metres::from_um(own.limit_um), path);
+        self.judge_benefit(store, geometry.as_deref(), &verified)?;
+        Ok(verified)
     }
 
     fn read_verified(
@@ -217,7 +222,9 @@ impl WorkVolume<'_> {
                 }
             };
             let correction_m = correction.map(|it| core::array::from_fn(|k| it[k].value()));
-            points.push(self.verified_point(config, &line, at, correction_m, journal)?);
+            let mut point = self.verified_point(config, &line, at, correction_m, journal)?;
+            point.known = correction.map(|it| Metres::ZERO - along(&line, &it));
+            points.push(point);
         }
         self.end_lines(operator)?;
         Ok(points)
@@ -243,7 +250,12 @@ impl WorkVolume<'_> {
             at_s: read.when.seconds(),
             ..LineReadingEntry::of(0, &read.observation(0))
         }))?;
-        Ok(VolumetricVerifiedPoint { at, deviation, u })
+        Ok(VolumetricVerifiedPoint {
+            at,
+            deviation,
+            u,
+            known: None,
+        })
     }
 
     /// What the thermometers showed last, °C; a verification does not depend on them.
@@ -259,6 +271,16 @@ impl WorkVolume<'_> {
     }
 }
 
+/// What an offset of the axes is along the line.
+fn along(line: &Line, offset: &[Metres]) -> Metres {
+    let [x, y, z] = [0, 1, 2].map(|k| offset[k]);
+    let (way, offset) = (line.task.end - line.task.start, Point::new(x, y, z));
+    let product = way.x.value() * offset.x.value()
+        + way.y.value() * offset.y.value()
+        + way.z.value() * offset.z.value();
+    Metres(product / way.distance().value())
+}
+
 fn judged(
     mut points: Vec<VolumetricVerifiedPoint>,
     limit: Metres,
@@ -266,8 +288,10 @@ fn judged(
 ) -> VolumetricVerified {
     let read: Vec<Metres> = points.iter().map(|it| it.deviation).collect();
     let (deviations, range) = from_the_first(&read);
+    let known_first = points.first().and_then(|it| it.known);
     for (it, deviation) in points.iter_mut().zip(deviations) {
         it.deviation = deviation;
+        it.known = it.known.zip(known_first).map(|(own, first)| own - first);
     }
     VolumetricVerified {
         points,

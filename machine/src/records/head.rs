@@ -155,6 +155,44 @@ pub struct InstrumentRecord {
     /// What its readings were not corrected for although they should have been.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub switched_off: Vec<String>,
+    /// The certificates of what it measures by; none without, and of earlier programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub certificates: Vec<CertificateRecord>,
+}
+
+/// A certificate of calibration by which readings were corrected.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CertificateRecord {
+    /// What of the instrument it is of.
+    pub of: String,
+    /// What its laboratory calls it.
+    pub identifier: String,
+    /// Who issued it.
+    pub laboratory: String,
+    /// Of what.
+    pub serial_number: String,
+    /// The last day of that calibration.
+    pub calibrated: String,
+    /// The last day that it holds.
+    pub valid_until: String,
+    /// BLAKE3 of its file.
+    pub blake3: String,
+}
+
+impl CertificateRecord {
+    /// For people.
+    pub fn text(&self) -> String {
+        format!(
+            "{}: certificate {} of {}, serial number {}, of {}, until {}",
+            self.of,
+            self.identifier,
+            self.laboratory,
+            self.serial_number,
+            self.calibrated,
+            self.valid_until
+        )
+    }
 }
 
 impl InstrumentRecord {

@@ -45,7 +45,9 @@ pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
 pub use failure::{ModelError, StoreError};
 pub use hash::ConfigHash;
-pub use head::{EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead};
+pub use head::{
+    CertificateRecord, EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead,
+};
 pub use interrupted::InterruptedRun;
 pub use journal::{
     AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_entries,

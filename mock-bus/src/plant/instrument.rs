@@ -103,7 +103,8 @@ impl Interferometer {
         let is_lit = seen.is_some_and(|it| it.is_lit);
         let (path_m, speed) = seen.map_or((0.0, 0.0), |it| (it.path_m, it.speed_m_per_s));
         let n = refractive_index(air.air_temperature, air.pressure, air.humidity);
-        let per_m = 2.0 * n / VACUUM_WAVELENGTH_M;
+        let wavelength_m = VACUUM_WAVELENGTH_M * (1.0 + self.config.wavelength_offset_ppm * 1e-6);
+        let per_m = 2.0 * n / wavelength_m;
         let noise_m = (self.config.noise_nm * 1e-9 + self.vibration_m) * self.noise.gaussian();
         let mixed_m = self.mixed_m(path_m * per_m);
         Fringes {

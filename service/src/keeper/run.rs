@@ -48,6 +48,8 @@ impl Task {
             stage: self.request.kind.stage(),
             resume: self.resume.clone(),
             accept_drift: self.request.accept_drift,
+            aside: self.request.aside,
+            verify: self.request.verify,
             uncompensated: self.request.uncompensated,
             warm_up_min: self.request.warm_up_min,
             first_part: self.request.kind == RunKind::FirstPart,

@@ -1,6 +1,7 @@
 //! Many machines and many power cycles: only in virtual time, whatever `RIG` says. The runner
 //! of the tests on SocketCAN leaves this module out by its name.
 
+mod certified;
 mod gantry;
 mod job;
 mod linear;
@@ -13,6 +14,7 @@ mod platform_causes;
 mod platform_knowledge;
 mod platform_strokes;
 mod platform_uncertainty;
+mod platform_worse;
 mod repeatable;
 mod rotary;
 mod rotary_sighted;

@@ -10,6 +10,7 @@ pub(crate) mod text;
 mod version_1;
 mod version_2;
 mod version_3;
+mod version_4;
 
 use machine::records::ConfigHash;
 
@@ -17,11 +18,11 @@ use super::model::MachineConfig;
 
 /// The hash of what a calibration depends on in `config`.
 pub(crate) fn hash_of(config: &MachineConfig) -> ConfigHash {
-    let (first, second) = (version_1::text(config), version_2::text(config));
-    match version_3::text(config) {
-        None => ConfigHash::of_texts(&second, &[first]),
-        Some(third) => ConfigHash::of_texts(&third, &[second, first]),
-    }
+    let mut texts = vec![version_2::text(config), version_1::text(config)];
+    texts.splice(0..0, version_3::text(config));
+    let fourth = version_4::text(config, &texts[0]);
+    texts.splice(0..0, fourth);
+    ConfigHash::of_texts(&texts[0], &texts[1..])
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Displacement instruments: `[instrument.NAME]`.
 
+mod certificate;
 pub(crate) mod nd287;
 mod off;
 pub(crate) mod umd2;
@@ -7,13 +8,15 @@ pub(crate) mod umd2;
 use core::time::Duration;
 
 use compensator::length_correction::{self, Cosine};
-use drivers::device::DisplacementInstrument;
+use drivers::device::{DisplacementInstrument, Environment};
 use machine::Patience;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use units::{Metres, Radians};
 
 use super::bus::{SerialLine, Wiring};
+use super::certificate::{Beyond, Certificate};
+use crate::certificate::{CertificateConfig, Figures};
 use crate::config::judge::Judge;
 pub(crate) use nd287::Nd287Config;
 pub(crate) use off::SwitchedOff;
@@ -72,6 +75,31 @@ pub(crate) trait Family {
     fn optics(&self) -> OpticsConfig {
         OpticsConfig::default()
     }
+
+    /// Its certificates.
+    fn certificates(&self) -> Vec<Certificate<&CertificateConfig>> {
+        Vec::new()
+    }
+
+    /// Likewise, to be read.
+    fn certificates_mut(&mut self) -> Vec<Certificate<&mut CertificateConfig>> {
+        Vec::new()
+    }
+
+    /// What its sensors say, with what their certificates correct.
+    fn certified(&self, seen: &Environment) -> Environment {
+        *seen
+    }
+
+    /// Readings of its sensors that nobody has calibrated them at.
+    fn beyond_certified(&self, _seen: &Environment) -> Vec<Beyond> {
+        Vec::new()
+    }
+
+    /// What the certificate of its scale says, if it has one.
+    fn scale(&self) -> Option<&Figures> {
+        None
+    }
 }
 
 /// What a counter counts: one that slips is wrong by a multiple of it.
@@ -87,6 +115,13 @@ pub struct Count {
 
 impl InstrumentDevice {
     fn family(&self) -> &dyn Family {
+        match self {
+            Self::Umd2(family) => family,
+            Self::Nd287(family) => family,
+        }
+    }
+
+    fn family_mut(&mut self) -> &mut dyn Family {
         match self {
             Self::Umd2(family) => family,
             Self::Nd287(family) => family,

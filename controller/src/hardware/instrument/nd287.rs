@@ -11,8 +11,10 @@ use serde::Deserialize;
 use units::{Metres, MetresPerSecond};
 
 use super::{Count, Family, InstrumentConfig};
+use crate::certificate::{CertificateConfig, Figures, Measurand};
 use crate::config::judge::Judge;
 use crate::hardware::bus::SerialLine;
+use crate::hardware::certificate::Certificate;
 
 /// How long a value may take at 9600 baud, whatever period is asked for.
 const SLOWEST: Duration = Duration::from_millis(70);
@@ -34,7 +36,21 @@ pub struct Nd287Config {
     /// Standard uncertainty of the scale's length, relative to it.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub scale_standard_uncertainty_ppm: f64,
+    /// What of it has a certificate.
+    #[serde(default)]
+    pub certificate: Nd287CertificatesConfig,
 }
+
+/// Certificates of a comparator.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Nd287CertificatesConfig {
+    /// Of its scale: positions that it shows, counted from the axis's zero, and their errors.
+    pub scale: Option<CertificateConfig>,
+}
+
+/// What a certificate is of, by its key.
+const SCALE: &str = "scale";
 
 impl Nd287Config {
     fn period(&self) -> Duration {
@@ -109,5 +125,20 @@ impl Family for Nd287Config {
 
     fn environment_frozen(&self) -> Option<Duration> {
         None
+    }
+
+    fn certificates(&self) -> Vec<Certificate<&CertificateConfig>> {
+        let own = self.certificate.scale.iter();
+        own.map(|it| (SCALE, Measurand::Length, it)).collect()
+    }
+
+    fn certificates_mut(&mut self) -> Vec<Certificate<&mut CertificateConfig>> {
+        let own = self.certificate.scale.iter_mut();
+        own.map(|it| (SCALE, Measurand::Length, it)).collect()
+    }
+
+    fn scale(&self) -> Option<&Figures> {
+        let certified = self.certificate.scale.as_ref()?.certified.as_deref()?;
+        Some(&certified.figures)
     }
 }

@@ -1,10 +1,12 @@
-//! A Digital Calibration Certificate (DCC) of a linear axis.
+//! A Digital Calibration Certificate (DCC) of a linear or a rotary axis.
 //!
 //! Source: Physikalisch-Technische Bundesanstalt, DCC schema 3.3.0 (`https://ptb.de/dcc`), and D-SI 2.2.1
 //! (`https://ptb.de/si`) for values with units and standard uncertainties.
 //!
 //! It says what the record says, and that nobody has accredited whoever issues it. Who that is, the record does not
 //! know: it is asked for. Absent: a signature; the certificates of the instruments.
+
+use core::f64::consts::TAU;
 
 use machine::records::RecordHead;
 use serde_json::Map;
@@ -14,6 +16,7 @@ use super::exported::Written;
 use crate::Failure;
 use crate::linear::LinearContent;
 use crate::linear::record::NodeRecord;
+use crate::rotary::RotaryContent;
 
 /// Who issues it.
 pub(super) struct Issuer<'a> {
@@ -23,28 +26,76 @@ pub(super) struct Issuer<'a> {
     pub(super) person: Option<&'a str>,
 }
 
+/// What it certifies.
+pub(super) struct Certifiable {
+    title: String,
+    results: String,
+}
+
+impl Certifiable {
+    /// # Errors
+    /// When an uncertainty is not known.
+    pub(super) fn linear(axis: &str, content: &LinearContent) -> Result<Self, Failure> {
+        let sides = content.approaches();
+        let u = |it: &NodeRecord| (sides.iter()).all(|side| uncertainty(it, *side).is_some());
+        if !content.nodes.iter().all(u) {
+            return Err(without_uncertainty());
+        }
+        Ok(Self {
+            title: format!("Positioning deviations of axis {axis}"),
+            results: sides.iter().map(|it| result(content, *it)).collect(),
+        })
+    }
+
+    /// # Errors
+    /// As [`Self::linear`].
+    pub(super) fn rotary(axis: &str, content: &RotaryContent) -> Result<Self, Failure> {
+        let u = content.standard_uncertainty_rad.as_deref();
+        let u = u.ok_or_else(without_uncertainty)?;
+        let lines = content.table_error_rad.len();
+        let angles: Vec<f64> = (0..lines)
+            .map(|it| TAU * it as f64 / lines as f64)
+            .collect();
+        // A reading too large is an axis short of its target.
+        let deviations: Vec<f64> = content.table_error_rad.iter().map(|it| -it).collect();
+        let columns = [
+            column("target angle", "\\radian", &angles, None),
+            column(DEVIATION, "\\radian", &deviations, Some(u)),
+        ];
+        Ok(Self {
+            title: format!("Angular positioning deviations of axis {axis}"),
+            results: listed(
+                "both directions, at the lines of a plate, mean zero",
+                &columns.concat(),
+            ),
+        })
+    }
+}
+
+/// What is certified of an axis.
+const DEVIATION: &str = "deviation, actual - target";
+
+fn without_uncertainty() -> Failure {
+    Failure::Usage {
+        what: "--format dcc: a certificate states the uncertainty of every value, and this calibration does not".into(),
+        help: "calibrate again with two runs at least, or import the table with --uncertainty-um".into(),
+    }
+}
+
 pub(super) fn written(
     id: &str,
     head: &RecordHead,
-    content: &LinearContent,
+    certified: &Certifiable,
     issuer: &Issuer<'_>,
 ) -> Result<Written, Failure> {
     let laboratory = given("--laboratory", issuer.laboratory)?;
     let person = given("--person", issuer.person)?;
     let country = country(given("--country", issuer.country)?)?;
-    let sides = content.approaches();
-    let u = |it: &NodeRecord| (sides.iter()).all(|side| uncertainty(it, *side).is_some());
-    if !content.nodes.iter().all(u) {
-        return Err(Failure::Usage {
-            what: "--format dcc: a certificate states the uncertainty of every value, and this calibration does not".into(),
-            help: "calibrate again with two runs at least, or import the table with --uncertainty-um".into(),
-        });
-    }
+    let Certifiable { title, results } = certified;
     let contact = format!(
         "{}<dcc:location><dcc:countryCode>{country}</dcc:countryCode></dcc:location>",
         name(laboratory)
     );
-    let results: String = sides.iter().map(|it| result(content, *it)).collect();
     let text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<dcc:digitalCalibrationCertificate xmlns:dcc=\"https://ptb.de/dcc\" \
          xmlns:si=\"https://ptb.de/si\" schemaVersion=\"3.3.0\">\n<dcc:administrativeData>\n{}{}{}\
@@ -57,10 +108,10 @@ pub(super) fn written(
         core(id, head, country),
         item(head),
         name(person),
-        statement(),
+        statement(head),
         equipment(head),
         conditions(head),
-        name(&format!("Positioning deviations of axis {}", head.axis)),
+        name(title),
     );
     Ok(Written {
         text,
@@ -157,14 +208,21 @@ fn item(head: &RecordHead) -> String {
     )
 }
 
-fn statement() -> String {
+fn statement(head: &RecordHead) -> String {
+    let certificates = match head.instrument.certificates.as_slice() {
+        [] => "The certificates of the instruments are not part of it.",
+        _ => {
+            "The certificates that corrected the readings are named with what measured; other instruments may have had \
+             none."
+        }
+    };
     format!(
         "<dcc:statements><dcc:statement>{}<dcc:declaration>{}</dcc:declaration></dcc:statement></dcc:statements>\n",
         name("In-house calibration, not accredited"),
-        content(
+        content(&format!(
             "This certificate was made by a program from a stored calibration. No accreditation body has assessed who \
-             issues it. It is not signed. The certificates of the instruments are not part of it."
-        )
+             issues it. It is not signed. {certificates}"
+        ))
     )
 }
 
@@ -188,8 +246,13 @@ fn equipment(head: &RecordHead) -> String {
     let lacks = instrument
         .warning()
         .map_or(String::new(), |it| format!("; {it}"));
+    let certified: String = instrument
+        .certificates
+        .iter()
+        .map(|it| format!("; {}", it.text()))
+        .collect();
     let what = format!(
-        "{} {}; corrected for: {corrected}{lacks}; source: {}",
+        "{} {}; corrected for: {corrected}{lacks}{certified}; source: {}",
         instrument.name, instrument.identity, head.source
     );
     format!(
@@ -245,39 +308,49 @@ fn deviation(node: &NodeRecord, side: Approach) -> Option<f64> {
 }
 
 fn result(content: &LinearContent, side: Approach) -> String {
-    let list = |of: &dyn Fn(&NodeRecord) -> Option<f64>| -> String {
-        let all: Vec<String> = content
-            .nodes
-            .iter()
-            .filter_map(of)
-            .map(|it| it.to_string())
-            .collect();
-        all.join(" ")
+    let list = |of: &dyn Fn(&NodeRecord) -> Option<f64>| -> Vec<f64> {
+        content.nodes.iter().filter_map(of).collect()
     };
-    let quantity = |what: &str, values: String, u: &str| {
-        format!(
-            "<dcc:quantity>{}<si:realListXMLList><si:valueXMLList>{values}</si:valueXMLList>\
-             <si:unitXMLList>\\metre</si:unitXMLList>{u}</si:realListXMLList></dcc:quantity>\n",
-            name(what)
-        )
-    };
-    let u = format!(
-        "<si:measurementUncertaintyUnivariateXMLList><si:standardMUXMLList><si:valueStandardMUXMLList>{}\
-         </si:valueStandardMUXMLList></si:standardMUXMLList></si:measurementUncertaintyUnivariateXMLList>",
-        list(&|it| uncertainty(it, side))
-    );
     let approach = match side {
         Approach::Forward => "forward approach (growing coordinates)",
         Approach::Reverse => "reverse approach (falling coordinates)",
     };
+    let (positions, deviations) = (
+        list(&|it| Some(it.position_m)),
+        list(&|it| deviation(it, side)),
+    );
+    let u = list(&|it| uncertainty(it, side));
+    let columns = [
+        column("target position", "\\metre", &positions, None),
+        column(DEVIATION, "\\metre", &deviations, Some(&u)),
+    ];
+    listed(approach, &columns.concat())
+}
+
+fn listed(title: &str, columns: &str) -> String {
     format!(
-        "<dcc:result>{}<dcc:data><dcc:list>\n{}{}</dcc:list></dcc:data></dcc:result>\n",
-        name(approach),
-        quantity("target position", list(&|it| Some(it.position_m)), ""),
-        quantity(
-            "deviation, actual - target",
-            list(&|it| deviation(it, side)),
-            &u
+        "<dcc:result>{}<dcc:data><dcc:list>\n{columns}</dcc:list></dcc:data></dcc:result>\n",
+        name(title)
+    )
+}
+
+/// Values, with their standard uncertainties where they have some.
+fn column(what: &str, unit: &str, values: &[f64], u: Option<&[f64]>) -> String {
+    let joined = |values: &[f64]| {
+        let each: Vec<String> = values.iter().map(f64::to_string).collect();
+        each.join(" ")
+    };
+    let u = u.map_or_else(String::new, |u| {
+        format!(
+            "<si:measurementUncertaintyUnivariateXMLList><si:standardMUXMLList><si:valueStandardMUXMLList>{}\
+             </si:valueStandardMUXMLList></si:standardMUXMLList></si:measurementUncertaintyUnivariateXMLList>",
+            joined(u)
         )
+    });
+    format!(
+        "<dcc:quantity>{}<si:realListXMLList><si:valueXMLList>{}</si:valueXMLList><si:unitXMLList>{unit}\
+         </si:unitXMLList>{u}</si:realListXMLList></dcc:quantity>\n",
+        name(what),
+        joined(values)
     )
 }

@@ -10,7 +10,7 @@ use machine::records::{CalibrationRecord, RecordHead, Store};
 use serde_json::{Map, Value, json};
 
 use super::correction::{Correction, Side};
-use super::dcc::Issuer;
+use super::dcc::{Certifiable, Issuer};
 use super::exported::{Exported, Written};
 use super::format::FormatName;
 use super::{csv, dcc, linuxcnc, pmac, sinumerik};
@@ -190,16 +190,22 @@ fn written(
 /// Of the record as it is, whatever the configuration has become since.
 fn certificate(args: &ExportArgs, store: &Store, id: &str) -> Result<Written, Failure> {
     let glance = store.glance(id)?;
-    if glance.kind != LinearContent::KIND {
-        return Err(not_of_one_axis(args.format, &glance.head, glance.kind));
-    }
-    let CalibrationRecord { head, content } = store.load::<LinearContent>(id)?;
+    let head = &glance.head;
+    let certified = match glance.kind {
+        LinearContent::KIND => {
+            Certifiable::linear(&head.axis, &store.load::<LinearContent>(id)?.content)
+        }
+        RotaryContent::KIND => {
+            Certifiable::rotary(&head.axis, &store.load::<RotaryContent>(id)?.content)
+        }
+        kind => return Err(not_of_one_axis(args.format, head, kind)),
+    }?;
     let issuer = Issuer {
         laboratory: args.laboratory.as_deref(),
         country: args.country.as_deref(),
         person: args.person.as_deref(),
     };
-    dcc::written(id, &head, &content, &issuer)
+    dcc::written(id, head, &certified, &issuer)
 }
 
 /// The record itself; nothing is chosen or interpolated.

@@ -81,6 +81,11 @@ impl Step {
         }
     }
 
+    /// Adds what becomes of it.
+    pub(crate) fn say(&mut self, more: &str) {
+        self.text += &format!("; {more}");
+    }
+
     /// Whether something is driven.
     pub(crate) fn moves(&self) -> bool {
         matches!(self.what, "zero" | "move")

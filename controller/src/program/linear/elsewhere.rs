@@ -49,7 +49,8 @@ impl Elsewhere<'_> {
         let mean = mean(all).unwrap_or(USUAL_AIR);
         let length = LengthCorrection::new(self.instrument.corrections(), &first);
         let made = length.and_then(|it| it.contributions(&mean));
-        let made = made.map_err(self.failed())?.into_iter().map(|(_, it)| it);
+        let made = made.map_err(self.failed())?.into_iter();
+        let made = made.map(|it| self.instrument.named(it));
         let short_period_nm = axis
             .calibrate
             .as_ref()
@@ -61,6 +62,7 @@ impl Elsewhere<'_> {
             short_period: Metres(short_period_nm * 1e-9),
             interpolation: settings::interpolation_of(axis),
             corrections: made
+                .chain(self.instrument.scale_contribution())
                 .chain(left_out(self.instrument, &first, &mean))
                 .collect(),
         };

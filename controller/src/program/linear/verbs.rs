@@ -15,8 +15,8 @@ use crate::program::output::{Ended, Output, with_counters};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_targets;
+use crate::program::tried::tried;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
-use crate::run::CalibrateOptions;
 use crate::runs::Told;
 use crate::{Agreed, Failure, Machine};
 
@@ -77,7 +77,6 @@ pub(crate) fn zero(args: &AxisArgs, output: Output) -> Ended {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    // What is stored is told, whatever becomes of the verification.
     let mut made = None;
     let Opened {
         mut session,
@@ -88,45 +87,28 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let ended = session.machine.guarded(|machine| {
         machine.start()?;
         machine.linear(&axis)?.zero(&store)?;
-        let resumed = resume.clone();
-        let options = CalibrateOptions {
-            resume,
-            accept_drift: args.accept_drift,
-            aside: args.no_activate,
-        };
-        let calibrated = resumable(&store, "calibrate", &axis, resumed.as_deref(), || {
+        let options = args.options(resume.clone());
+        let calibrated = resumable(&store, "calibrate", &axis, resume.as_deref(), || {
             machine.linear(&axis)?.calibrate(&store, &options)
         })?;
-        let calibrated = made.insert(calibrated);
+        made = Some(told::calibrated(&calibrated));
         let verified = match args.verify {
             true => {
                 let options = VerifyOptions {
                     compensated: true,
-                    calibration: Some(calibrated.id.clone()),
+                    calibration: Some(calibrated.id),
                     resume: None,
                 };
-                Some(verified_by(machine, &axis, &store, &options)?)
+                let verified = verified_by(machine, &axis, &store, &options)?;
+                let told = told::verified(&axis, &verified, true);
+                Some((told, verified.out_of_tolerance(&axis)))
             }
             false => None,
         };
         machine.shut_down()?;
         Ok((verified, to_json::counters(&machine.devices().counters())))
     });
-    let Some(calibrated) = made else {
-        return ended.and(Ok(None));
-    };
-    let mut told = told::calibrated(&calibrated);
-    let (verified, counters) = match ended {
-        Ok(ended) => ended,
-        Err(failure) => return output.bad_result(&told.text, told.value, failure),
-    };
-    let Some(verified) = verified else {
-        return output.told(told, counters);
-    };
-    let then = told::verified(&axis, &verified, true);
-    told.text += &format!("\n{}", then.text);
-    told.value["verified"] = then.value;
-    judged(&axis, &verified, told, counters, output)
+    tried(made, ended, output)
 }
 
 fn verified_by(

@@ -179,6 +179,8 @@ fn devices<L>(journal: &ReadJournal<L>) -> Vec<Fact> {
         };
         facts.push(Fact::new("instrument", value));
     }
+    let certificates = it.certificates.iter();
+    facts.extend(certificates.map(|it| Fact::new("certificate", it.text())));
     facts
 }
 

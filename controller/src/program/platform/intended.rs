@@ -8,7 +8,7 @@ use crate::config::Loaded;
 use crate::platform::{PlatformConfig, PlatformFailure};
 use crate::program::intended::{Intent, Step, calibration, nowhere};
 use crate::program::platform::target::asked;
-use crate::program::{AxisArgs, MoveArgs};
+use crate::program::{AxisArgs, CalibrateArgs, MoveArgs};
 
 /// What all screws are called together.
 const WHOLE: &str = "platform";
@@ -18,7 +18,6 @@ pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
     match intent {
         Intent::Zero(args) => whole_only(&args.axis),
         Intent::Calibrate(args) => {
-            args.only_made()?;
             args.readings.refuse()?;
             whole_only(&args.axis)?;
             never_resumed(args.resume.is_some())?;
@@ -85,7 +84,12 @@ pub(crate) fn intended(
     }
     match intent {
         Intent::Zero(_) => {}
-        Intent::Calibrate(_) => steps.push(calibrated(platform)?),
+        Intent::Calibrate(args) => {
+            steps.push(calibrated(platform, args)?);
+            if args.verify {
+                steps.push(verified(platform)?);
+            }
+        }
         Intent::Verify(args) => {
             let step = verified(platform)?;
             if !args.uncompensated {
@@ -115,7 +119,7 @@ fn missing(section: &'static str) -> Failure {
     PlatformFailure::NotConfigured { section }.into()
 }
 
-fn calibrated(platform: &PlatformConfig) -> Result<Step, Failure> {
+fn calibrated(platform: &PlatformConfig, args: &CalibrateArgs) -> Result<Step, Failure> {
     let own = platform.calibrate.as_ref();
     let own = own.ok_or_else(|| missing("calibrate"))?;
     let strokes = platform.actuator.iter().map(|screw| {
@@ -127,10 +131,11 @@ fn calibrated(platform: &PlatformConfig) -> Result<Step, Failure> {
     });
     let strokes: Vec<String> = strokes.collect();
     let text = format!(
-        "{}, {} from each side, seen by {}; what was found is stored and used from then on",
+        "{}, {} from each side, seen by {}; {}",
         strokes.join(", "),
         Several(own.runs, "time"),
         platform.camera,
+        args.then(),
     );
     Ok(Step::new("calibrate", WHOLE, text))
 }

@@ -14,6 +14,7 @@ use crate::program::platform::target::asked;
 use crate::program::platform::uncertainty;
 use crate::program::session::Session;
 use crate::program::text::verdict;
+use crate::program::tried::{tried, used};
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::runs::Told;
 use crate::{Failure, Machine};
@@ -74,12 +75,25 @@ pub(super) fn zeroed(zeroed: &PlatformZeroed) -> Told {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    let run = |machine: &mut Machine, store: &Store| machine.platform()?.calibrate(store);
-    let (calibrated, counters) =
-        with_zeroed_platform(&args.axis.machine, "calibrate", output, run)?;
-    let mut value = calibrated_value(&calibrated);
-    value["counters"] = counters;
-    output.result(&calibrated_text(&calibrated), &value)
+    let mut made = None;
+    let run = |machine: &mut Machine, store: &Store| {
+        let options = args.options(None);
+        let calibrated = machine.platform()?.calibrate_by(store, &options)?;
+        made = Some(Told {
+            text: calibrated_text(&calibrated),
+            value: calibrated_value(&calibrated),
+        });
+        if !args.verify {
+            return Ok(None);
+        }
+        let verified = machine.platform()?.verify(store, true)?;
+        Ok(Some((
+            verified_as(&verified, true),
+            verified.out_of_tolerance(),
+        )))
+    };
+    let ended = with_zeroed_platform(&args.axis.machine, "calibrate", output, run);
+    tried(made, ended, output)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
@@ -215,7 +229,8 @@ fn aligned_value(aligned: &Aligned) -> Value {
 
 pub(crate) fn calibrated_text(calibrated: &PlatformCalibrated) -> String {
     let mut text = format!(
-        "every screw calibrated and activated; closure {:.3} µm\npoints in {}",
+        "{}; closure {:.3} µm\npoints in {}",
+        used("every screw calibrated,", calibrated.is_in_use),
         calibrated.closure.um(),
         calibrated.journal.display()
     );
@@ -258,6 +273,7 @@ pub(crate) fn calibrated_value(calibrated: &PlatformCalibrated) -> Value {
         .collect();
     json!({
         "screws": screws,
+        "in_use": calibrated.is_in_use,
         "closure_um": to_json::um(calibrated.closure),
         "journal": calibrated.journal,
     })

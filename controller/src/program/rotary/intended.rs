@@ -15,8 +15,7 @@ use crate::run::missing;
 /// Words that rotary axes have no use for.
 pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
     match intent {
-        Intent::Zero(_) | Intent::Verify(_) => Ok(()),
-        Intent::Calibrate(args) => args.only_made(),
+        Intent::Zero(_) | Intent::Verify(_) | Intent::Calibrate(_) => Ok(()),
         Intent::Move(args) => {
             args.without_beyond()?;
             args.without_align()
@@ -36,7 +35,15 @@ pub(crate) fn intended(
         }
         Intent::Calibrate(args) => {
             let read_by = ReadBy::of(&args.axis, &args.readings)?;
-            measured(loaded, intent, (&args.axis, read_by), calibrated)
+            let mut steps = measured(loaded, intent, (&args.axis, read_by), calibrated)?;
+            if let Some(step) = steps.last_mut() {
+                step.say(args.then());
+            }
+            if args.verify {
+                let axis = axis_of(loaded, &args.axis)?;
+                steps.push(verified(&axis, &loaded.config.rotary[&axis])?);
+            }
+            Ok(steps)
         }
         Intent::Verify(args) => {
             let read_by = ReadBy::of(&args.axis, &args.readings)?;
@@ -95,8 +102,7 @@ fn calibrated(axis: &str, of_axis: &RotaryConfig) -> Result<Step, Failure> {
         false => "read by a person, line by line".to_owned(),
     };
     let text = format!(
-        "plate {} of {} lines at the offsets {:?}, to which somebody turns it: {by}; what was found is stored and \
-         used from then on",
+        "plate {} of {} lines at the offsets {:?}, to which somebody turns it: {by}",
         own.plate, own.lines, offsets,
     );
     Ok(Step::new("calibrate", axis, text))

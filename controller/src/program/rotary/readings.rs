@@ -18,10 +18,9 @@ use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::rotary::json::arcsec;
 use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
 use crate::program::session::choose_axis;
-use crate::program::{AxisArgs, CalibrateArgs, VerifyArgs};
+use crate::program::{AxisArgs, CalibrateArgs, VerifyArgs, only_for};
 use crate::rotary::sighted::alone::{self, NextPlacement, Progress, ReadingsFile, Source};
 use crate::rotary::subject::Subject;
-use crate::run::CalibrateOptions;
 
 /// Readings that were made elsewhere.
 #[derive(Clone, Debug, Args)]
@@ -157,15 +156,21 @@ impl Desk {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
+    only_for(
+        "--verify",
+        "tables that the machine turns; verify this one afterwards",
+        args.verify,
+    )?;
     let files = args.readings.files()?;
     let mut person = reader(&files, args.ask.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "calibrate")?;
     let (axis, store) = (desk.axis.as_str(), &desk.store);
-    let options = CalibrateOptions {
-        resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
-        accept_drift: args.accept_drift,
-        ..CalibrateOptions::default()
-    };
+    let options = args.options(journal_to_resume(
+        args.resume.as_ref(),
+        store,
+        "calibrate",
+        axis,
+    )?);
     let resumed = options.resume.as_deref();
     let progress = resumable(store, "calibrate", axis, resumed, || {
         let source = source(&files, &mut person);

@@ -7,6 +7,7 @@ use crate::program::output::{Ended, Output};
 use crate::program::rotary::json::{arcsec, bidirectional, harmonics, solution};
 use crate::program::rotary::uncertainty;
 use crate::program::text::verdict;
+use crate::program::tried::used;
 use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryMoved, RotaryTeller, RotaryVerified};
 use crate::runs::Told;
@@ -42,7 +43,7 @@ pub(crate) fn calibrated(axis: &str, calibrated: &RotaryCalibrated) -> Told {
     }
 }
 
-fn told_verified(axis: &str, verified: &RotaryVerified) -> Told {
+pub(crate) fn told_verified(axis: &str, verified: &RotaryVerified) -> Told {
     let mut value = verified_value(verified);
     value["axis"] = json!(axis);
     Told {
@@ -79,10 +80,13 @@ pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
         .scatter
         .map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
     let mut text = format!(
-        "calibration {} stored and activated\n  {} lines at offsets {:?}: table error up to {:.3}″ at \
+        "{}\n  {} lines at offsets {:?}: table error up to {:.3}″ at \
          the lines, plate up to {:.3}″\n  standard uncertainty {u}; one line in one pass scatters by {scatter}\n  \
          {}\n  the plate moved by {:.3}″ at most while it was read\n  {}\n  passes in {}",
-        short(&calibrated.id),
+        used(
+            &format!("calibration {}", short(&calibrated.id)),
+            calibrated.is_in_use,
+        ),
         solution.design.lines(),
         solution.design.offsets(),
         content.largest_error().arcsec(),
@@ -112,6 +116,7 @@ pub(crate) fn calibrated_text(calibrated: &RotaryCalibrated) -> String {
 pub(crate) fn calibrated_value(calibrated: &RotaryCalibrated) -> Value {
     let mut value = solution(&calibrated.solution);
     value["calibration"] = json!(calibrated.id);
+    value["in_use"] = json!(calibrated.is_in_use);
     value["path"] = json!(calibrated.path);
     value["journal"] = json!(calibrated.journal);
     value["closure_arcsec"] = json!(arcsec(calibrated.closure));

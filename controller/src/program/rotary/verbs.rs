@@ -11,8 +11,8 @@ use crate::program::rotary::readings::{self, ReadBy};
 use crate::program::rotary::targets::{named_way, targets, turns_left_out};
 use crate::program::rotary::told::{self, verified, zeroed};
 use crate::program::session::{Session, choose_axis};
+use crate::program::tried::tried;
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
-use crate::run::CalibrateOptions;
 use crate::{Agreed, Failure, Machine};
 use machine::records::Store;
 
@@ -61,24 +61,32 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         ReadBy::Driven => Reader::Person(readings::person(args.ask.yes, &args.axis, output, true)?),
         ReadBy::Alone => return readings::calibrate(args, output),
     };
+    let mut made = None;
     let run = |machine: &mut Machine, axis: &str, store: &Store| {
-        let options = CalibrateOptions {
-            resume: journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?,
-            accept_drift: args.accept_drift,
-            ..CalibrateOptions::default()
-        };
-        let resumed = options.resume.clone();
-        resumable(store, "calibrate", axis, resumed.as_deref(), || {
+        let resume = journal_to_resume(args.resume.as_ref(), store, "calibrate", axis)?;
+        let options = args.options(resume.clone());
+        let calibrated = resumable(store, "calibrate", axis, resume.as_deref(), || {
             let mut table = machine.rotary(axis)?;
             match &mut operator {
                 Reader::Detector(operator) => table.calibrate(store, &options, operator),
                 Reader::Person(person) => table.calibrate_sighted(store, &options, person),
             }
-        })
+        })?;
+        made = Some(told::calibrated(axis, &calibrated));
+        if !args.verify {
+            return Ok(None);
+        }
+        let mut table = machine.rotary(axis)?;
+        let verified = match &mut operator {
+            Reader::Detector(operator) => table.verify(store, true, operator),
+            Reader::Person(person) => table.verify_sighted(store, (true, None), person),
+        }?;
+        let bad = verified.out_of_tolerance(axis);
+        Ok(Some((told::told_verified(axis, &verified), bad)))
     };
-    let (axis, calibrated, counters) =
-        with_zeroed_table(&args.axis, "calibrate", Use::Measurement, output, run)?;
-    output.told(told::calibrated(&axis, &calibrated), counters)
+    let ended = with_zeroed_table(&args.axis, "calibrate", Use::Measurement, output, run);
+    let ended = ended.map(|(_, verified, counters)| (verified, counters));
+    tried(made, ended, output)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {

@@ -31,7 +31,6 @@ pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
 }
 
 fn made_anew(args: &CalibrateArgs) -> Result<(), Failure> {
-    args.only_made()?;
     args.readings.refuse()?;
     if args.accept_drift {
         return Err(Failure::Usage {
@@ -67,7 +66,12 @@ pub(crate) fn intended(
     }
     match intent {
         Intent::Zero(_) => {}
-        Intent::Calibrate(args) => steps.push(calibrated(volume, args)?),
+        Intent::Calibrate(args) => {
+            steps.push(calibrated(volume, args)?);
+            if args.verify {
+                steps.push(verified(volume)?);
+            }
+        }
         Intent::Verify(args) => {
             let step = verified(volume)?;
             if !args.uncompensated && store.active(GEOMETRY)?.current.is_none() {
@@ -112,7 +116,7 @@ fn calibrated(volume: &VolumetricConfig, args: &CalibrateArgs) -> Result<Step, F
             Short(minutes)
         );
     }
-    text += "; what was found is stored and used from then on";
+    text += &format!("; {}", args.then());
     Ok(Step::new("calibrate", WHOLE, text))
 }
 

@@ -16,6 +16,7 @@ use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::text::verdict;
+use crate::program::tried::tried;
 use crate::program::volumetric::moved::moved;
 use crate::program::volumetric::uncertainty;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
@@ -94,26 +95,43 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let ready = |_: &mut Machine, store: &Store| {
         journal_to_resume(args.resume.as_ref(), store, "calibrate", GEOMETRY)
     };
+    let mut made = None;
     let run = |machine: &mut Machine, store: &Store, resume: Option<PathBuf>| {
-        let resume = resume.as_deref();
-        resumable(store, "calibrate", GEOMETRY, resume, || {
+        let options = args.options(resume.clone());
+        let calibrated = resumable(store, "calibrate", GEOMETRY, resume.as_deref(), || {
             machine
                 .volumetric()?
-                .calibrate(store, warm_up, resume, &mut operator)
-        })
+                .calibrate_by(store, warm_up, &options, &mut operator)
+        })?;
+        made = Some(Told {
+            text: calibrated_text(&calibrated),
+            value: calibrated_value(&calibrated),
+        });
+        if !args.verify {
+            return Ok(None);
+        }
+        let by = VerifyBy::Everything;
+        let verified = machine.volumetric()?.verify(store, by, &mut operator)?;
+        let told = Told {
+            text: verified_text(&verified),
+            value: verified_value(&verified),
+        };
+        Ok(Some((told, verified.out_of_tolerance())))
     };
     let (machine, purpose) = (&args.axis.machine, Use::Measurement);
-    let (made, counters) = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run)?;
-    let mut value = calibrated_value(&made);
-    value["counters"] = counters;
-    output.result(&calibrated_text(&made), &value)
+    let ended = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run);
+    tried(made, ended, output)
 }
 
 pub(crate) fn calibrated_text(made: &VolumetricCalibrated) -> String {
     format!(
-        "errors {} and references {} are in use: {}\n  {}{}",
+        "errors {} and references {} are {}: {}\n  {}{}",
         short(&made.id),
         short(&made.references),
+        match made.is_in_use {
+            true => "in use",
+            false => "stored; what was used before is used still",
+        },
         made.agreement.readings_text(),
         made.agreement.tool_text(),
         budget_text(made.budget.as_ref())
@@ -173,6 +191,7 @@ pub(crate) fn calibrated_value(made: &VolumetricCalibrated) -> Value {
     value["geometry"] = json!(made.id);
     value["references"] = json!(made.references);
     value["lines"] = json!(made.lines);
+    value["in_use"] = json!(made.is_in_use);
     value["journal"] = json!(made.journal);
     value["u_tool_max_um"] = json!(made.u_max.um());
     value["uncertainty"] = uncertainty::value(made.budget.as_ref());

@@ -45,7 +45,7 @@ pub(crate) use scatter::Scatter;
 
 use crate::failure::Failure;
 use crate::made_by::made_by;
-use crate::run::{note_failure, utc_now};
+use crate::run::{CalibrateOptions, note_failure, require_certified, utc_now};
 use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
@@ -56,7 +56,7 @@ use crate::volumetric::reference::References;
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
-use crate::volumetric::{GEOMETRY, VolumetricFailure};
+use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
 use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
@@ -112,6 +112,8 @@ pub struct VolumetricCalibrated {
     pub unknown: UnknownRecord,
     /// Where every reading is.
     pub journal: PathBuf,
+    /// Whether they are used from now on.
+    pub is_in_use: bool,
 }
 
 /// What is known of the machine when its lines are read.
@@ -150,6 +152,25 @@ impl WorkVolume<'_> {
         resume: Option<&Path>,
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricCalibrated, Failure> {
+        let options = CalibrateOptions {
+            resume: resume.map(Path::to_owned),
+            ..CalibrateOptions::default()
+        };
+        self.calibrate_by(store, warm_up, &options, operator)
+    }
+
+    /// The same; with `options.aside` what is found is stored only, and what was used before is used still.
+    ///
+    /// # Errors
+    /// As [`Self::calibrate`].
+    pub fn calibrate_by(
+        &mut self,
+        store: &Store,
+        warm_up: WarmUp,
+        options: &CalibrateOptions,
+        operator: &mut dyn LineOperator,
+    ) -> Result<VolumetricCalibrated, Failure> {
+        let resume = options.resume.as_deref();
         let config = self.config.clone();
         let drives = self.volume_drives(&config);
         let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
@@ -160,7 +181,7 @@ impl WorkVolume<'_> {
             .calibration_session(config, lines, read, &mut journal, operator)
             .and_then(|mut session| {
                 self.read_lines(&mut session, warm_up, &mut journal)?;
-                self.conclude(store, session, &mut journal)
+                self.conclude(store, session, &mut journal, !options.aside)
             });
         let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
@@ -181,6 +202,7 @@ impl WorkVolume<'_> {
             let instrument = instrument.clone();
             return Err(VolumetricFailure::NoInstrument { instrument }.into());
         }
+        require_certified(self.core.config, "")?;
         let head = self.this_volume(GEOMETRY)?;
         Ok(JournalHeader {
             schema_version: SCHEMA_VERSION,
@@ -328,6 +350,7 @@ impl WorkVolume<'_> {
         store: &Store,
         session: Session<'_>,
         journal: &mut Journal<VolumeLog>,
+        is_used: bool,
     ) -> Result<VolumetricCalibrated, Failure> {
         let shape = function_shape(session.config.compensation.interpolation);
         let evaluated = VolumetricEvaluated::of(&session.read, shape)?;
@@ -348,7 +371,10 @@ impl WorkVolume<'_> {
         let (unknown, budget) = (content.unknown.clone(), content.budget.clone());
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
-        store.activate(GEOMETRY, &id)?;
+        if is_used {
+            store.activate(REFERENCES, &references.id)?;
+            store.activate(GEOMETRY, &id)?;
+        }
         Ok(VolumetricCalibrated {
             id,
             references: references.id,
@@ -359,6 +385,7 @@ impl WorkVolume<'_> {
             budget,
             unknown,
             journal: journal.path().to_owned(),
+            is_in_use: is_used,
         })
     }
 }

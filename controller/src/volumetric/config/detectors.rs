@@ -1,11 +1,13 @@
 //! What watches three axes: beams and their detectors, roll detectors, thermometers.
 
 use core::num::NonZeroU32;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::VolumeAxisName;
+use crate::certificate::{CertificateConfig, Certified};
 
 /// The reference beams, of the axes that have one.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -343,9 +345,12 @@ pub struct TemperatureConfig {
     /// So many equal samples in a row, and it is stuck; with noise of a third of a step, 1000.
     #[schemars(range(min = 10, max = 1000000))]
     pub stuck_samples: Option<NonZeroU32>,
-    /// Of a change since the calibration; an offset that the sensor keeps does not matter.
+    /// Of a change since the calibration; an offset that the sensor keeps does not matter. With a certificate of what it
+    /// does not say, which is added in squares.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub standard_uncertainty_k: f64,
+    /// Of the thermometer: its readings are corrected by it.
+    pub certificate: Option<CertificateConfig>,
     /// Expansion of the x, y and z scale; negative where the workpiece expands. `calibrate` with
     /// warm lines finds it anew and its value is used instead, for an axis by the mean of those
     /// thermometers where this is not 0; it finds none for an axis where all are 0.
@@ -360,4 +365,11 @@ pub struct TemperatureConfig {
     #[serde(default)]
     #[schemars(extend("x-magnitude" = [0.0, 1e4]))]
     pub squareness_arcsec_per_k: [f64; 3],
+}
+
+impl TemperatureConfig {
+    /// What its certificate says of its readings, if it has one.
+    pub(crate) fn certified(&self) -> Option<Arc<Certified>> {
+        self.certificate.as_ref()?.certified.clone()
+    }
 }

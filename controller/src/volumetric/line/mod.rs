@@ -55,7 +55,7 @@ pub struct LineReadout {
 /// A line that is set up.
 #[derive(Clone, Debug)]
 pub struct Line {
-    task: LineTask,
+    pub(super) task: LineTask,
     along: [f64; 3],
     measure: Measure,
     readout: LineReadout,
@@ -137,11 +137,8 @@ impl WorkVolume<'_> {
         let offset = self.read_path(readout)?.vacuum;
         let config = &self.core.config.instrument[&readout.instrument];
         let settings = settings::line_corrections(config, measure.has_two_beams());
-        let environment = self
-            .core
-            .devices()
-            .instrument(&readout.instrument)?
-            .environment();
+        self.core.tell_beyond_certified(&readout.instrument, &[])?;
+        let environment = self.core.environment_of(&readout.instrument)?;
         let environment = assemble::correction_environment(&environment);
         let length = LengthCorrection::new(settings, &environment);
         let length = length.map_err(|source| Failure::Correction {
@@ -178,7 +175,7 @@ impl WorkVolume<'_> {
     ) -> Result<LineReading, Failure> {
         let counted = self.read_path(&line.readout)?;
         let instrument = &line.readout.instrument;
-        let environment = self.core.devices().instrument(instrument)?.environment();
+        let environment = self.core.environment_of(instrument)?;
         let environment = assemble::correction_environment(&environment);
         let failed = |source| Failure::Correction {
             instrument: instrument.clone(),
@@ -283,7 +280,7 @@ impl WorkVolume<'_> {
                 .latest()
                 .is_some();
             if is_lit {
-                return Ok(self.core.use_instrument(instrument)?);
+                return self.core.use_instrument(instrument);
             }
             if self.core.now() >= limit {
                 let instrument = instrument.to_owned();

@@ -248,6 +248,8 @@ pub struct InterferometerConfig {
     pub nonlinearity_nm: f64,
     /// Faster than this the counter loses count.
     pub speed_max_m_per_s: f64,
+    /// How far the wavelength in vacuum is off that of every helium-neon laser, relative to it.
+    pub wavelength_offset_ppm: f64,
     /// Constant errors of the instrument's own sensors.
     pub air_temperature_error_k: f64,
     pub pressure_error_hpa: f64,
@@ -263,6 +265,7 @@ impl Default for InterferometerConfig {
             noise_nm: 3.0,
             nonlinearity_nm: 0.0,
             speed_max_m_per_s: 0.4,
+            wavelength_offset_ppm: 0.0,
             air_temperature_error_k: 0.0,
             pressure_error_hpa: 0.0,
             humidity_error_percent: 0.0,

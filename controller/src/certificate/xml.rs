@@ -1,0 +1,89 @@
+//! A certificate as a tree of elements. Whoever writes a file must not be able to exhaust or mislead its reader: it is
+//! limited in size, in elements and in depth, and it declares nothing (no DTD, hence no entities of its own).
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::{Unfit, unfit};
+
+pub(super) const DCC: &str = "https://ptb.de/dcc";
+pub(super) const SI: &str = "https://ptb.de/si";
+
+/// A certificate with pictures of its laboratory in it has some hundred kilobytes.
+pub(super) const BYTES_MAX: u64 = 4 << 20;
+const NODES_MAX: u32 = 200_000;
+/// A quantity in lists of lists is some 15 elements deep.
+const DEPTH_MAX: usize = 64;
+
+/// The tree of `text`.
+///
+/// # Errors
+/// When it is no XML, declares something, or is beyond a limit.
+pub(super) fn parsed(text: &str) -> Result<Document<'_>, Unfit> {
+    let options = ParsingOptions {
+        allow_dtd: false,
+        nodes_limit: NODES_MAX,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options).or_else(|error| {
+        unfit(
+            format!("it is no XML that is read here: {error}"),
+            "ask the laboratory for the certificate as it was issued; one with a DTD or with entities of its own is \
+             not read",
+        )
+    })?;
+    let is_deep = |it: Node<'_, '_>| it.ancestors().nth(DEPTH_MAX).is_some();
+    match document.descendants().any(is_deep) {
+        true => unfit(
+            format!("its elements are nested deeper than {DEPTH_MAX}"),
+            "no certificate is; ask the laboratory for it as it was issued",
+        ),
+        false => Ok(document),
+    }
+}
+
+pub(super) fn is(node: Node<'_, '_>, space: &str, name: &str) -> bool {
+    node.is_element() && node.has_tag_name((space, name))
+}
+
+/// The elements of `name` just below `node`.
+pub(super) fn children<'a, 'i: 'a>(
+    node: Node<'a, 'i>,
+    space: &'static str,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(move |it| is(*it, space, name))
+}
+
+pub(super) fn child<'a, 'i: 'a>(
+    node: Node<'a, 'i>,
+    space: &'static str,
+    name: &'static str,
+) -> Option<Node<'a, 'i>> {
+    children(node, space, name).next()
+}
+
+/// The element at the end of a path of names.
+pub(super) fn at<'a, 'i: 'a>(
+    node: Node<'a, 'i>,
+    space: &'static str,
+    path: &[&'static str],
+) -> Option<Node<'a, 'i>> {
+    path.iter()
+        .try_fold(node, |node, name| child(node, space, name))
+}
+
+/// All that is written in `node`, without what surrounds it.
+pub(super) fn text(node: Node<'_, '_>) -> String {
+    let all: String = node
+        .descendants()
+        .filter(|it| it.is_text())
+        .filter_map(|it| it.text())
+        .collect();
+    all.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What `node` is called, in whatever language comes first.
+pub(super) fn name_of(node: Node<'_, '_>) -> String {
+    let content = at(node, DCC, &["name", "content"]);
+    content.map(text).unwrap_or_default()
+}

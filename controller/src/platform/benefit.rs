@@ -1,0 +1,95 @@
+//! Whether the calibrations of the screws make a platform better, by what a verification has seen: without them it would
+//! have been off by what was seen and by what they took away.
+
+use compensator::platform::Pose;
+use units::{Metres, Radians};
+
+use crate::failure::Failure;
+use crate::platform::PoseMoved;
+use crate::platform::handle::AlignmentPlatform;
+use crate::platform::state::{difference, largest_error};
+use crate::platform::verify::PlatformVerified;
+use crate::store::{Store, short};
+use crate::worse::likely_cause;
+
+impl AlignmentPlatform<'_> {
+    /// The error that the screws' calibrations took away of a move to `target`: they sent the platform so far beside it.
+    pub(super) fn known_error(&self, target: Pose, moved: &PoseMoved) -> Option<Pose> {
+        let nominal = self.strokes_to(target).ok()?;
+        let sent: Vec<Metres> = moved.set_points.iter().map(|it| it.1).collect();
+        let kinematics = &self.state.kinematics;
+        let pose = |strokes: &[Metres]| Some(kinematics.forward_near(strokes, target).ok()?.pose);
+        Some(difference(pose(&nominal)?, pose(&sent)?))
+    }
+
+    /// Calibrations with which a platform is out of tolerance and worse than without are taken out of use, all of them:
+    /// they were made together.
+    pub(super) fn judge_benefit(
+        &mut self,
+        store: &Store,
+        verified: &PlatformVerified,
+    ) -> Result<(), Failure> {
+        let edge = Metres::from_mm(self.config.edge_mm);
+        let judged = verified.poses.iter().filter_map(|it| {
+            let (left, known) = (difference(it.seen, it.target), it.known?);
+            Some((left, known))
+        });
+        let judged: Vec<(Pose, Pose)> = judged.collect();
+        let rms = |of: &dyn Fn(&(Pose, Pose)) -> Pose| {
+            let squares = judged.iter().map(|it| {
+                let error = largest_error(of(it), edge).value();
+                error * error
+            });
+            Metres((squares.sum::<f64>() / judged.len().max(1) as f64).sqrt())
+        };
+        let (before, after) = (rms(&|it| sum(it.0, it.1)), rms(&|it| it.0));
+        if verified.is_within_tolerance() || after <= before {
+            return Ok(());
+        }
+        let pairs: Vec<(f64, f64)> = judged
+            .iter()
+            .flat_map(|(left, known)| {
+                let each =
+                    |it: &Pose| [it.x.value(), it.y.value(), it.angle.value() * edge.value()];
+                let (known, left) = (each(known), each(left));
+                [0, 1, 2].map(|at| (known[at], left[at]))
+            })
+            .collect();
+        let (calibration, in_use) = self.fall_back(store)?;
+        Err(Failure::MadeWorse {
+            axis: "platform".into(),
+            calibration,
+            before,
+            after,
+            cause: likely_cause(&pairs),
+            in_use,
+        })
+    }
+
+    /// Those before are used again, screw by screw, or none; what is no longer used, and what is.
+    fn fall_back(&mut self, store: &Store) -> Result<(String, Option<String>), Failure> {
+        let mut left = Vec::new();
+        let mut in_use = Vec::new();
+        for at in 0..self.state.screws.len() {
+            let screw = &mut self.state.screws[at];
+            screw.compensation = None;
+            let (axis, id) = (screw.axis.clone(), screw.calibration.take());
+            left.extend(id.as_deref().map(short));
+            if id.is_some() && store.active(&axis)?.current == id {
+                in_use.extend(store.retire(&axis)?.as_deref().map(short));
+            }
+        }
+        // What does not fit any more is said when somebody uses it.
+        let _ = self.load_active(store);
+        let named = (!in_use.is_empty()).then(|| in_use.join(", "));
+        Ok((left.join(", "), named))
+    }
+}
+
+fn sum(a: Pose, b: Pose) -> Pose {
+    Pose {
+        x: a.x + b.x,
+        y: a.y + b.y,
+        angle: Radians(a.angle.value() + b.angle.value()),
+    }
+}
