@@ -1,5 +1,6 @@
 //! GTC computes the same uncertainties, degrees of freedom and covariances from the same budgets.
 
+mod certified;
 mod places;
 mod tool_now;
 mod zero;

@@ -1,6 +1,7 @@
 """Whether certificates are valid by the DCC schema, and what they say, read as D-SI defines it.
 
-In: the schema's path as argument, then a line with the path of a certificate for each. Out: for each one line of
+In: the schema's path as argument, then a line with the path of a certificate for each; one that is of another schema
+has that schema's path behind it, after a tab. Out: for each one line of
 JSON: whether it is valid, why not, the unit and the numbers of each result, and its statements. The schema is that of the
 Physikalisch-Technische Bundesanstalt; lxml (libxml2) judges by it.
 """
@@ -26,6 +27,8 @@ def said(root):
     results = []
     for result in root.iter(DCC + "result"):
         quantities = list(result.iter(DCC + "quantity"))
+        if len(quantities) < 2:
+            continue
         results.append(
             {
                 "name": texts(result, DCC + "name")[0],
@@ -49,9 +52,13 @@ def judged(schema, path):
 
 
 def main():
-    schema = etree.XMLSchema(etree.parse(sys.argv[1]))
+    schemas = {}
     for line in sys.stdin:
-        print(json.dumps(judged(schema, line.strip())), flush=True)
+        path, _, of = line.strip().partition("\t")
+        of = of or sys.argv[1]
+        if of not in schemas:
+            schemas[of] = etree.XMLSchema(etree.parse(of))
+        print(json.dumps(judged(schemas[of], path)), flush=True)
 
 
 main()

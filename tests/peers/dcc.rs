@@ -1,26 +1,45 @@
 //! Certificates of drawn calibrations against the schema of the PTB, by lxml. The schema lies beside the project, not
 //! in it.
 
+mod instruments;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use serde_json::Value;
-use tests::{Edit, LINEAR, left_out, random};
+use tests::{Edit, LINEAR, ROTARY, left_out, random};
 
 use crate::peer::{Peer, can_import};
 
-const SCHEMA: &str = "lib/dcc/schema/resources/dcc/v3.3.0/dcc.xsd";
 const CERTIFICATES: u64 = 20;
 
-fn schema() -> Option<PathBuf> {
+/// The schema of this version, if it lies beside the project.
+pub(crate) fn schema(version: &str) -> Option<PathBuf> {
     let usual = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/dcc");
     let folder = std::env::var_os("TRUESTAGE_DCC").map_or_else(|| usual.into(), PathBuf::from);
-    Some(folder.join(SCHEMA)).filter(|it| it.exists())
+    let own = format!("lib/dcc/schema/resources/dcc/v{version}/dcc.xsd");
+    Some(folder.join(own)).filter(|it| it.exists())
 }
 
-/// The command beside the tests that cargo built.
-pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Value {
+/// Whether certificates can be judged by their schema here; says so where they cannot.
+pub(crate) fn can_judge(what: &str) -> bool {
+    if schema("3.3.0").is_none() {
+        left_out(
+            what,
+            "the schema is not beside the project (../shared/dcc, or TRUESTAGE_DCC)",
+        );
+        return false;
+    }
+    if !can_import("lxml") {
+        left_out(what, "the Python of the peers has no lxml");
+        return false;
+    }
+    true
+}
+
+/// How the command beside the tests that cargo built ended.
+pub(crate) fn ended(folder: &Path, words: &[&str]) -> Output {
     let test = std::env::current_exe().expect("a process knows its program");
     let program = test
         .ancestors()
@@ -32,7 +51,12 @@ pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Value {
         .arg("--json")
         .args(words)
         .output();
-    let ended = ended.expect("`cargo build --workspace --bins` has built it");
+    ended.expect("`cargo build --workspace --bins` has built it")
+}
+
+/// What it printed.
+pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Value {
+    let ended = ended(folder, words);
     assert!(
         ended.status.success(),
         "{words:?}: {}",
@@ -105,6 +129,106 @@ fn certificates(folder: &Path) -> Vec<(PathBuf, Value)> {
     (1..=CERTIFICATES).map(make).collect()
 }
 
+/// Readings of a plate of some lines in three placements, with errors and noise.
+fn plate(state: &mut u64, lines: usize) -> String {
+    let mut text = "offset,line,deviation_arcsec\n".to_owned();
+    let mut drawn = |count: usize, size: f64| -> Vec<f64> {
+        (0..count).map(|_| size * (random(state) - 0.5)).collect()
+    };
+    let (table, plate) = (drawn(lines, 4.0), drawn(lines, 2.0));
+    let noise = drawn(3 * lines, 0.05);
+    for (placement, offset) in [0, 1, 5].into_iter().enumerate() {
+        for line in 0..lines {
+            let reading =
+                table[(line + offset) % lines] + plate[line] + noise[placement * lines + line];
+            text += &format!("{offset},{line},{reading}\n");
+        }
+    }
+    text
+}
+
+/// Certificates of rotary tables in `folder`, each with the record that it was made of.
+fn rotary_certificates(folder: &Path) -> Vec<(PathBuf, Value)> {
+    fs::write(folder.join("rotary.toml"), ROTARY.machine).expect("there is room");
+    let make = |seed| {
+        let mut state: u64 = seed ^ 0x0072_6f74;
+        let lines = 12 + 2 * (20.0 * random(&mut state)) as usize;
+        fs::write(folder.join("c.csv"), plate(&mut state, lines)).expect("there is room");
+        let lines = lines.to_string();
+        let words = [
+            "fit",
+            "rotary",
+            "c.csv",
+            "--lines",
+            &lines,
+            "--save",
+            "rotary.toml",
+        ];
+        let id = truestage(folder, &words)["calibration"].clone();
+        let id = id.as_str().expect("a name");
+        let name = format!("rotary-{seed}.xml");
+        let words = [
+            "cal",
+            "export",
+            "rotary.toml",
+            id,
+            "--format",
+            "dcc",
+            "--out",
+            &name,
+        ];
+        truestage(folder, &[&words[..], &ISSUER].concat());
+        let shown = truestage(folder, &["cal", "show", "rotary.toml", id]);
+        (folder.join(name), shown["record"].clone())
+    };
+    (1..=CERTIFICATES).map(make).collect()
+}
+
+#[test]
+fn certificates_of_rotary_tables_are_valid_and_say_what_was_stored() {
+    if !can_judge("certificates of rotary tables by the DCC schema") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let all = rotary_certificates(folder.path());
+    let schema = schema("3.3.0").expect("it is there");
+    let mut judge = Peer::start("dcc.py", &[&schema.display().to_string()]);
+    let broken = all.iter().enumerate().map(|(at, (path, _))| {
+        let (from, to) = BROKEN[at % BROKEN.len()];
+        let turned = |it: &str| it.split("metre").collect::<Vec<_>>().join("radian");
+        let (from, to) = (turned(from), turned(to));
+        let text = fs::read_to_string(path).expect("it was written");
+        let broken = path.with_extension("broken.xml");
+        fs::write(&broken, text.edit_first(&from, &to)).expect("there is room");
+        broken
+    });
+    let paths: Vec<PathBuf> = all.iter().map(|it| it.0.clone()).chain(broken).collect();
+    judge.feed(
+        &paths
+            .iter()
+            .map(|it| format!("{}\n", it.display()))
+            .collect::<String>(),
+    );
+    for (path, record) in &all {
+        let report = judge.report();
+        assert_eq!(report["valid"], true, "{}: {report}", path.display());
+        let [result] = report["results"].as_array().expect("a list").as_slice() else {
+            panic!("{report}")
+        };
+        assert_eq!(result["units"], serde_json::json!(["\\radian", "\\radian"]));
+        assert_eq!(result["uncertainties"], record["standard_uncertainty_rad"]);
+        let errors = record["table_error_rad"].as_array().expect("numbers");
+        let deviations = result["deviations"].as_array().expect("numbers");
+        assert_eq!(errors.len(), deviations.len());
+        for (error, deviation) in errors.iter().zip(deviations) {
+            assert_eq!(error.as_f64().map(|it| -it), deviation.as_f64());
+        }
+    }
+    for path in &paths[all.len()..] {
+        assert_eq!(judge.report()["valid"], false, "{}", path.display());
+    }
+}
+
 /// Something that no certificate may lack, or have otherwise.
 const BROKEN: [(&str, &str); 10] = [
     ("<dcc:measurementResults>", "<dcc:measurementResult>"),
@@ -133,16 +257,10 @@ const BROKEN: [(&str, &str); 10] = [
 
 #[test]
 fn certificates_are_valid_by_the_schema_and_say_what_was_stored() {
-    let what = "certificates by the DCC schema";
-    let Some(schema) = schema() else {
-        return left_out(
-            what,
-            "the schema is not beside the project (../shared/dcc, or TRUESTAGE_DCC)",
-        );
-    };
-    if !can_import("lxml") {
-        return left_out(what, "the Python of the peers has no lxml");
+    if !can_judge("certificates by the DCC schema") {
+        return;
     }
+    let schema = schema("3.3.0").expect("it is there");
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let all = certificates(folder.path());
     let mut paths: Vec<PathBuf> = all.iter().map(|it| it.0.clone()).collect();
