@@ -73,6 +73,7 @@ impl Measurand {
     }
 
     /// A difference of it for the screen.
+    #[cfg(feature = "program")]
     pub(crate) const fn small_unit(self) -> (&'static str, f64) {
         match self {
             Self::Wavelength => ("fm", 1e15),

@@ -33,7 +33,7 @@ pub struct Loaded {
     /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
     pub unfilled: Vec<Diagnostic>,
     /// Certificates that have ended, or are of a day to come: nothing is measured with what they certify.
-    pub(crate) ended: Vec<Diagnostic>,
+    pub ended: Vec<Diagnostic>,
     /// By how much every supervision and answer time-out is longer than configured: not at all,
     /// except for emulated machines. One that lives faster than real time still meets a host whose
     /// own pauses do not shrink, so its time-outs must bear them.
