@@ -46,13 +46,7 @@ fn calibrated(mut bench: Bench) -> Result<(Metres, Vec<String>), Failure> {
             .linear("x")?
             .calibrate(&store, &CalibrateOptions::default())?;
         machine.shut_down()?;
-        let last = made
-            .fitted
-            .table
-            .nodes()
-            .last()
-            .expect("it has positions")
-            .clone();
+        let last = *made.fitted.table.nodes().last().expect("it has positions");
         let certificates = made.record.head.instrument.certificates.iter();
         Ok((
             last.forward.expect("it was approached so"),

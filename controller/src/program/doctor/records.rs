@@ -45,6 +45,12 @@ pub(super) fn folder(root: &Path) -> Vec<Checked> {
 
 /// What is in use.
 pub(super) fn calibrations(config: &MachineConfig, store: &Store) -> Vec<Checked> {
+    let names = pointers(config);
+    names.iter().map(|it| calibration(store, it)).collect()
+}
+
+/// Under which names calibrations are in use.
+pub(super) fn pointers(config: &MachineConfig) -> Vec<String> {
     let axes = config.axis.keys().chain(config.rotary.keys());
     let mut names: Vec<String> = axes.cloned().collect();
     for pointer in groups(config).into_iter().flat_map(|it| it.pointers) {
@@ -52,7 +58,7 @@ pub(super) fn calibrations(config: &MachineConfig, store: &Store) -> Vec<Checked
             names.push(pointer);
         }
     }
-    names.iter().map(|it| calibration(store, it)).collect()
+    names
 }
 
 /// Who has the machine, if anybody has.

@@ -7,8 +7,8 @@ use machine::records::Store;
 
 use super::checked::Checked;
 use super::host::Host;
+use super::records::pointers;
 use crate::config::MachineConfig;
-use crate::program::kind::KINDS;
 
 const SUBJECT: &str = "time of day";
 /// No computer with this program has an earlier one (2026-01-01); one without a battery begins in 1970 or 2000.
@@ -83,9 +83,7 @@ fn judged(
 
 /// The newest calibration in use, and whose it is.
 fn newest(config: &MachineConfig, store: &Store) -> Option<(String, Timestamp)> {
-    let axes = config.axis.keys().chain(config.rotary.keys()).cloned();
-    let pointers = KINDS.iter().flat_map(|it| (it.pointers)(config));
-    let made = axes.chain(pointers).filter_map(|pointer| {
+    let made = pointers(config).into_iter().filter_map(|pointer| {
         let id = store.active(&pointer).ok()?.current?;
         let created = store.glance(&id).ok()?.head.created;
         Some((pointer, created.parse().ok()?))
