@@ -27,9 +27,9 @@ impl Certified {
     }
 }
 
+#[cfg(feature = "program")]
 impl Figures {
     /// As `check --json` prints them, in SI units (temperatures in degrees Celsius).
-    #[cfg(feature = "program")]
     pub(crate) fn value(&self) -> Value {
         match self {
             Self::Value { value, u } => json!({"value": value, "standard_uncertainty": u}),

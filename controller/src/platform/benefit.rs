@@ -5,8 +5,8 @@ use compensator::platform::Pose;
 use units::{Metres, Radians};
 
 use crate::failure::Failure;
-use crate::platform::PoseMoved;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::moves::PoseMoved;
 use crate::platform::state::{difference, largest_error};
 use crate::platform::verify::PlatformVerified;
 use crate::store::{Store, short};
