@@ -122,8 +122,6 @@ fn what_the_verb_would_refuse_is_refused() {
     refused(LINEAR, &["move", "y=1mm", "--dry-run"], 2, "no axis `y`");
     let words = ["zero", "--axis", "x1", "--dry-run"];
     refused(GANTRY, &words, 2, "a side of the gantry beam");
-    let words = ["calibrate", "--no-activate", "--dry-run"];
-    refused(UVW, &words, 2, "--no-activate is for linear axes");
     let words = ["calibrate", "--axis", "u", "--dry-run"];
     refused(UVW, &words, 2, "part of a platform");
     refused(UVW, &["verify", "--dry-run"], 3, "without a calibration");

@@ -211,7 +211,7 @@ impl Certificate {
     /// The XML.
     pub fn text(&self) -> String {
         let contact = format!(
-            "{}<dcc:location><dcc:countryCode>DE</dcc:countryCode></dcc:location>",
+            "{}<dcc:eMail>laboratory@example.org</dcc:eMail><dcc:location><dcc:countryCode>DE</dcc:countryCode></dcc:location>",
             name("Laboratory of the test")
         );
         let results: String = self.results.iter().map(|it| self.result(it)).collect();
@@ -249,9 +249,11 @@ impl Certificate {
 
     fn item(&self) -> String {
         format!(
-            "<dcc:items><dcc:item>{}<dcc:identifications><dcc:identification><dcc:issuer>manufacturer</dcc:issuer>\
+            "<dcc:items><dcc:item>{}<dcc:manufacturer>{}</dcc:manufacturer><dcc:identifications><dcc:identification>\
+             <dcc:issuer>manufacturer</dcc:issuer>\
              <dcc:value>{}</dcc:value></dcc:identification></dcc:identifications></dcc:item></dcc:items>\n",
             name("what was calibrated"),
+            name("who made it"),
             self.serial_number
         )
     }
@@ -261,9 +263,8 @@ impl Certificate {
             return String::new();
         };
         format!(
-            "<dcc:statements><dcc:statement>{}<dcc:valid>true</dcc:valid><dcc:period>{period}</dcc:period></dcc:statement>\
-             </dcc:statements>\n",
-            name("interval of calibration")
+            "<dcc:statements><dcc:statement><dcc:valid>true</dcc:valid><dcc:period>{period}</dcc:period></dcc:statement>\
+             </dcc:statements>\n"
         )
     }
 

@@ -178,7 +178,10 @@ impl WorkVolume<'_> {
         journal.complete()?;
         let path = journal.path().to_owned();
         let verified = judged(points, Metres::from_um(own.limit_um), path);
-        self.judge_benefit(store, geometry.as_deref(), &verified)?;
+        // By the tables alone is how a machine is compared that also has detectors: their part is left out on purpose.
+        if by == VerifyBy::Everything {
+            self.judge_benefit(store, geometry.as_deref(), &verified)?;
+        }
         Ok(verified)
     }
 

@@ -134,7 +134,7 @@ fn gtc_comes_to_the_same_uncertainty_with_certificates_and_without() {
         );
     }
     assert!(
-        ours[1] < ours[0] / 5.0,
-        "certificates are worth something: {ours:?}"
+        ours[1] < 0.7 * ours[0],
+        "what is left is the coefficient of expansion, which nothing here certifies: {ours:?}"
     );
 }
