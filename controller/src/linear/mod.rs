@@ -46,7 +46,7 @@ pub(crate) mod zero_budget;
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use course::{Corrected, Course, PlannedMove};
 pub use job::{Job, JobOperator, JobPlan, Reached};
-pub use log::{LinearLog, SweepLog};
+pub use log::LinearLog;
 pub use moved::Moved;
 pub use record::LinearContent;
 pub use stage::LinearStage;

@@ -347,22 +347,6 @@ impl AgreedArgs {
     }
 }
 
-impl CalibrateArgs {
-    /// What becomes of what is found.
-    const fn then(&self) -> &'static str {
-        tried::then(self.no_activate)
-    }
-
-    /// How it is made, by this journal if it goes on with one.
-    fn options(&self, resume: Option<PathBuf>) -> CalibrateOptions {
-        CalibrateOptions {
-            resume,
-            accept_drift: self.accept_drift,
-            aside: self.no_activate,
-        }
-    }
-}
-
 impl MoveArgs {
     /// `truestage move x=12.5mm` means `./machine.toml`, as with every verb.
     fn settle(mut self) -> Self {
@@ -410,7 +394,6 @@ fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failu
     }
 }
 
-use crate::run::CalibrateOptions;
 use serve::Network;
 pub use serve::Serving;
 use token::NewToken;

@@ -1,9 +1,13 @@
 //! A calibration that is verified at once: what was stored is told, whatever becomes of its verification.
 
+use std::path::PathBuf;
+
 use serde_json::Value;
 
+use super::CalibrateArgs;
 use super::output::{Ended, Output, with_counters};
 use crate::Failure;
+use crate::run::CalibrateOptions;
 use crate::runs::Told;
 
 /// A verification, and what it fails by.
@@ -42,10 +46,21 @@ pub(crate) fn used(what: &str, is_in_use: bool) -> String {
     }
 }
 
-/// What becomes of what is found, before it is.
-pub(crate) const fn then(is_aside: bool) -> &'static str {
-    match is_aside {
-        true => "what was found is stored, and not used",
-        false => "what was found is stored and used from then on",
+impl CalibrateArgs {
+    /// What becomes of what is found, before it is.
+    pub(super) const fn then(&self) -> &'static str {
+        match self.no_activate {
+            true => "what was found is stored, and not used",
+            false => "what was found is stored and used from then on",
+        }
+    }
+
+    /// How it is made, by this journal if it goes on with one.
+    pub(super) fn options(&self, resume: Option<PathBuf>) -> CalibrateOptions {
+        CalibrateOptions {
+            resume,
+            accept_drift: self.accept_drift,
+            aside: self.no_activate,
+        }
     }
 }
