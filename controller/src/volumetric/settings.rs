@@ -3,7 +3,6 @@
 use core::time::Duration;
 
 use compensator::error_table::Limits;
-use compensator::uncertainty::combine;
 use compensator::volumetric::function::{Function, FunctionError, Shape};
 use compensator::volumetric::identify::BendPlan;
 use compensator::volumetric::model::{Chain, ChainError, Thermal, ThermalChannel};
@@ -232,10 +231,7 @@ pub(crate) fn thermal(config: &VolumetricConfig, references: &[Celsius]) -> Ther
         u_expansion: [0.0; 3],
         growth: point_of_mm(it.growth_um_per_k.map(|um| um * 1e-3)),
         squareness: it.squareness_arcsec_per_k.map(Radians::from_arcsec),
-        u: combine(&[
-            it.standard_uncertainty_k,
-            it.certified().map_or(0.0, |it| it.figures.u()),
-        ]),
+        u: it.u_kelvin(),
     });
     Thermal {
         channels: channels.collect(),

@@ -16,7 +16,7 @@ use crate::volumetric::settings::{
 use crate::volumetric::{
     AXES, BendEntry, ExpansionEntry, LineEntry, OpticsName, VolumePlanEntry, metres,
 };
-use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
+use crate::volumetric::{TemperatureConfig, VolumetricCalibrateConfig, VolumetricConfig};
 
 /// How the errors of the machine of `config` are found, and by which lines; `is_warm`: with lines
 /// that are read again when it is warmer, which determine the thermal errors.
@@ -175,7 +175,7 @@ fn of_warmth(config: &VolumetricConfig) -> VolumePlanEntry {
         seen_from_m: it.seen_from.map(metres),
     });
     let u = config.temperature.iter();
-    let u = u.map(|it| it.standard_uncertainty_k);
+    let u = u.map(TemperatureConfig::u_kelvin);
     VolumePlanEntry {
         thermometer_u_k: u.fold(0.0, f64::max),
         expansions: expansions.collect(),

@@ -3,6 +3,7 @@
 use core::num::NonZeroU32;
 use std::sync::Arc;
 
+use compensator::uncertainty::combine;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -371,5 +372,11 @@ impl TemperatureConfig {
     /// What its certificate says of its readings, if it has one.
     pub(crate) fn certified(&self) -> Option<Arc<Certified>> {
         self.certificate.as_ref()?.certified.clone()
+    }
+
+    /// The standard uncertainty of what it shows, in kelvin, with that of its certificate.
+    pub(crate) fn u_kelvin(&self) -> f64 {
+        let certified = self.certified().map_or(0.0, |it| it.figures.u());
+        combine(&[self.standard_uncertainty_k, certified])
     }
 }
