@@ -1,5 +1,8 @@
+use std::sync::Arc;
+
 use super::*;
 use crate::Edit;
+use crate::certificate::{CertificateConfig, Certified, Figures};
 use crate::config::parse;
 use crate::edit::with_spot_cameras;
 use crate::kinds::KINDS;
@@ -144,6 +147,42 @@ fn the_text_of_a_missing_correction_is_written_as_it_was_published() {
     let published = include_str!("golden/linear-uncorrected.txt");
     assert_eq!(text.as_deref(), Some(published));
     assert_eq!(version_3::text(&parse(LINEAR, "m").unwrap().config), None);
+}
+
+/// Of several results of one certificate another one corrects otherwise; one that does not say which has the text of before.
+#[test]
+fn the_text_of_a_certificate_says_its_result_where_one_is_named() {
+    let text = |result: Option<&str>| {
+        let mut config = parse(VOLUMETRIC, "m").unwrap().config;
+        let of = config.volumetric.as_mut().unwrap();
+        of.temperature[0].certificate = Some(CertificateConfig {
+            file: "t.xml".into(),
+            serial_number: "T".into(),
+            result: result.map(str::to_owned),
+            valid_months: None,
+            remind_days: 30,
+            certified: Some(Arc::new(certified())),
+        });
+        version_4::text(&config, "first line\nbody\n").unwrap()
+    };
+    let before = text(None);
+    assert!(before.ends_with("body\nvolumetric.temperature.0.certificate = \"ab\"\n"), "{before}");
+    assert_eq!(
+        text(Some("as left")),
+        before + "volumetric.temperature.0.certificate.result = \"as left\"\n"
+    );
+}
+
+fn certified() -> Certified {
+    Certified {
+        identifier: "K".into(),
+        laboratory: "L".into(),
+        serial_number: "T".into(),
+        calibrated: jiff::civil::date(2026, 1, 1),
+        valid_until: jiff::civil::date(2027, 1, 1),
+        hash: "ab".into(),
+        figures: Figures::Value { value: 0.0, u: 0.0 },
+    }
 }
 
 #[test]
