@@ -238,6 +238,19 @@ impl LinearSeries {
         &self.measurements
     }
 
+    /// The series with what `correction` says of each measured position added to it.
+    #[must_use]
+    pub fn plus(&self, correction: impl Fn(Metres) -> Metres) -> Self {
+        let each = self.measurements.iter().map(|it| Measurement {
+            measured: it.measured + correction(it.measured),
+            ..*it
+        });
+        Self {
+            measurements: each.collect(),
+            environments: self.environments.clone(),
+        }
+    }
+
     /// The distinct targets, increasing.
     pub fn targets(&self) -> Vec<Metres> {
         let mut targets: Vec<Metres> = self.measurements.iter().map(|m| m.target).collect();

@@ -13,6 +13,8 @@
 //! | `result` | which result is meant, as a value or a table of corrections |
 //! | `measurand` | what can be certified, and what of that can be |
 //! | `table` | corrections by readings |
+//! | `standing` | whether it holds on a day |
+//! | `record` | what of it is kept with what was measured, and shown |
 //! | `read` | the certificates of a machine, read and judged |
 //!
 //! Absent: signatures are not checked (nobody's key is known here); covariances between results.
@@ -35,6 +37,8 @@ pub(crate) use read::{Named, read, today};
 #[cfg(feature = "program")]
 pub(crate) use record::shown;
 pub(crate) use standing::Standing;
+#[cfg(test)]
+pub(crate) use table::Point;
 pub(crate) use table::{Certified, Figures};
 
 /// Why a certificate cannot be used, and what to do.

@@ -97,3 +97,80 @@ impl InstrumentConfig {
         records.collect()
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::certificate::{Certified, Figures, Point};
+    use crate::hardware::instrument::InstrumentDevice;
+    use crate::hardware::instrument::nd287::{Nd287CertificatesConfig, Nd287Config};
+
+    const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
+
+    /// A comparator whose scale shows 1 µm too little at 0 and at -10 mm, 4 µm too much at 10 mm.
+    pub(crate) fn comparator(reverse: bool) -> InstrumentConfig {
+        let config = crate::config::parse(LINEAR, "m").unwrap().config;
+        let point = |reading, correction| Point {
+            reading,
+            correction,
+            u: 1e-7,
+        };
+        let figures = vec![point(-0.01, 1e-6), point(0.0, 1e-6), point(0.01, -4e-6)];
+        let certified = Certified {
+            identifier: "K".into(),
+            laboratory: "L".into(),
+            serial_number: "S".into(),
+            calibrated: jiff::civil::date(2026, 1, 1),
+            valid_until: jiff::civil::date(2027, 1, 1),
+            hash: "ab".into(),
+            figures: Figures::Table(figures),
+        };
+        let scale = CertificateConfig {
+            file: "s.xml".into(),
+            serial_number: "S".into(),
+            result: None,
+            valid_months: None,
+            remind_days: 30,
+            certified: Some(Arc::new(certified)),
+        };
+        InstrumentConfig {
+            device: InstrumentDevice::Nd287(Nd287Config {
+                poll_period_ms: 100.0,
+                signal_period_um: 4.0,
+                speed_max_mm_per_s: 500.0,
+                scale_standard_uncertainty_ppm: 0.5,
+                certificate: Nd287CertificatesConfig { scale: Some(scale) },
+            }),
+            reverse,
+            correct_cosine: false,
+            ..config.instrument["laser"].clone()
+        }
+    }
+
+    /// What is added where the axis is at `mm`, in micrometres.
+    #[track_caller]
+    fn check(reverse: bool, mm: f64, expected: f64) {
+        let seen = comparator(reverse)
+            .scale_correction(Metres::from_mm(mm))
+            .um();
+        assert!(
+            (seen - expected).abs() < 1e-9,
+            "reverse {reverse}, {mm} mm: {seen} µm"
+        );
+    }
+
+    #[test]
+    fn a_scale_that_shows_too_much_is_corrected_to_less_whichever_way_it_counts() {
+        for reverse in [false, true] {
+            check(reverse, 0.0, 0.0);
+        }
+        check(false, 10.0, -5.0);
+        check(false, 5.0, -2.5);
+        check(false, -10.0, 0.0);
+        // The axis is at -10 mm where it shows 10 mm, which are 9.995 mm from its zero.
+        check(true, -10.0, 5.0);
+        check(true, 10.0, 0.0);
+    }
+}

@@ -5,6 +5,9 @@ pub(crate) mod nd287;
 mod off;
 pub(crate) mod umd2;
 
+#[cfg(test)]
+pub(crate) use certificate::tests::comparator;
+
 use core::time::Duration;
 
 use compensator::length_correction::{self, Cosine};

@@ -20,14 +20,15 @@ pub(crate) struct Elsewhere<'a> {
 }
 
 impl Elsewhere<'_> {
-    /// The readings with the corrections that the instrument's section switches on, each by its own environment;
-    /// as they are where the file has no columns of it.
+    /// The readings with the corrections that the instrument's section switches on, each by its own environment
+    /// (none of these where the file has no columns of it), and with what the certificate of its scale corrects.
     ///
     /// # Errors
     /// When the environment permits no correction.
     pub(crate) fn corrected(&self, series: &LinearSeries) -> Result<LinearSeries, Failure> {
         let settings = self.instrument.corrections();
-        series.corrected(settings).map_err(self.failed())
+        let series = series.corrected(settings).map_err(self.failed())?;
+        Ok(series.plus(|it| self.instrument.scale_correction(it)))
     }
 
     /// What makes the table that was `fitted` to `series` uncertain. The zero of the data is the datum of the
@@ -91,4 +92,32 @@ fn mean(all: &[Environment]) -> Option<Environment> {
         humidity: RelativeHumidity(mean(|it| it.humidity.value())),
         material_temperature: Celsius(mean(|it| it.material_temperature.value())),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hardware::instrument::comparator;
+
+    /// At 10 mm the scale shows 5 µm more than at 0: there is less than was read.
+    #[test]
+    fn what_the_certificate_of_a_scale_corrects_is_made_of_readings_from_elsewhere() {
+        let csv = "run,approach,target_mm,measured_mm\n1,+,0,0\n1,+,10,10\n";
+        let series = LinearSeries::from_csv(csv, "x.csv").unwrap();
+        let instrument = comparator(false);
+        let elsewhere = Elsewhere {
+            name: "laser",
+            instrument: &instrument,
+        };
+        let corrected = elsewhere.corrected(&series).unwrap();
+        let read: Vec<f64> = corrected
+            .measurements()
+            .iter()
+            .map(|it| it.measured.um())
+            .collect();
+        assert!(
+            read[0].abs() < 1e-9 && (read[1] - 9995.0).abs() < 1e-6,
+            "{read:?}"
+        );
+    }
 }
