@@ -46,19 +46,19 @@ impl Measurand {
         )
     }
 
-    pub(super) const fn possible(self) -> Possible {
+    /// `None` of a laser, which is one value: `result` judges it.
+    pub(super) const fn possible(self) -> Option<Possible> {
         let (readings, correction) = match self {
-            // A laser is one value; `result` judges it.
-            Self::Wavelength => ((300e-9, 2e-6), 1e-9),
+            Self::Wavelength => return None,
             Self::Temperature => ((-60.0, 150.0), 5.0),
             Self::Pressure => ((10e3, 200e3), 10e3),
             Self::Humidity => ((0.0, 1.0), 0.2),
             Self::Length => ((-100.0, 100.0), 1e-3),
         };
-        Possible {
+        Some(Possible {
             readings,
             correction,
-        }
+        })
     }
 
     /// One of it for the screen, in SI units of the certificate's figures.

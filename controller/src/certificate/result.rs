@@ -23,6 +23,8 @@ const ALIKE: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
     Reference,
+    /// What was set: it counts as the reference where none is stated.
+    Nominal,
     Measured,
     Error,
     Correction,
@@ -30,7 +32,7 @@ enum Column {
 
 const COLUMNS: [(&str, Column); 7] = [
     ("basic_referenceValue", Column::Reference),
-    ("basic_nominalValue", Column::Reference),
+    ("basic_nominalValue", Column::Nominal),
     ("basic_measuredValue", Column::Measured),
     ("basic_measurementError", Column::Error),
     ("basic_measurementError_error", Column::Error),
@@ -96,43 +98,149 @@ fn sought(measurand: Measurand) -> String {
     }
 }
 
+/// Columns that stand together.
+type Columns = Vec<(Option<Column>, Values)>;
+
 /// `None` where the result is of something else.
 fn of_result(result: Node<'_, '_>, measurand: Measurand) -> Result<Option<Figures>, Unfit> {
     let Some(data) = child(result, DCC, "data") else {
         return Ok(None);
     };
-    let columns = columns(data, measurand)?;
+    let lists = lists(data, measurand)?;
     match measurand {
-        Measurand::Wavelength => wavelength(&columns),
-        _ => table(&columns, measurand),
+        Measurand::Wavelength => {
+            let all: Columns = lists.into_iter().flat_map(|it| it.columns).collect();
+            wavelength(&all)
+        }
+        _ => match the_table(joined_rows(lists)?) {
+            Ok(columns) => table(&columns, measurand),
+            Err(count) => unfit(
+                format!(
+                    "its result `{}` says {count} tables; which is meant?",
+                    name_of(result)
+                ),
+                "ask the laboratory for a result of its own for each of them",
+            ),
+        },
     }
 }
 
-/// Its columns that are stated in a unit of `measurand`; those in pieces joined.
-fn columns(
-    data: Node<'_, '_>,
-    measurand: Measurand,
-) -> Result<Vec<(Option<Column>, Values)>, Unfit> {
-    let mut found: Vec<(Option<Column>, Values)> = Vec::new();
+/// What one list of a result says.
+struct List<'a, 'i> {
+    node: Node<'a, 'i>,
+    columns: Columns,
+}
+
+/// Each list with its columns that are stated in a unit of `measurand`.
+fn lists<'a, 'i: 'a>(data: Node<'a, 'i>, measurand: Measurand) -> Result<Vec<List<'a, 'i>>, Unfit> {
+    let mut found: Vec<List<'a, 'i>> = Vec::new();
     for quantity in quantities(data) {
         let words = quantity.attribute("refType").unwrap_or_default();
         let column = words
             .split_whitespace()
             .find_map(|word| Some(COLUMNS.iter().find(|it| it.0 == word)?.1));
-        let own = of_quantity(quantity)?;
-        let own = own
-            .into_iter()
-            .find(|it| measurand.is_stated_in(it.unit.dimension));
-        let Some(own) = own else { continue };
-        match found
-            .iter_mut()
-            .find(|it| it.0 == column && column.is_some())
-        {
-            Some(before) => before.1 = before.1.clone().joined(own)?,
-            None => found.push((column, own)),
+        let own = of_quantity(quantity)?.into_iter();
+        let own = own.filter(|it| measurand.is_stated_in(it.unit.dimension));
+        // Of one that is stated in several units: a length before a frequency.
+        let own = own.min_by_key(|it| it.unit.dimension == Dimension::Frequency);
+        let (Some(own), Some(node)) = (own, quantity.parent()) else {
+            continue;
+        };
+        match found.iter_mut().find(|it| it.node == node) {
+            Some(list) => list.columns.push((column, own)),
+            None => found.push(List {
+                node,
+                columns: vec![(column, own)],
+            }),
         }
     }
     Ok(found)
+}
+
+/// The columns of each table: those whose lists have one value in each quantity are rows of one, where they stand in
+/// one list.
+fn joined_rows(lists: Vec<List<'_, '_>>) -> Result<Vec<Columns>, Unfit> {
+    let mut tables: Vec<(Node<'_, '_>, bool, Columns)> = Vec::new();
+    for List { node, columns } in lists {
+        let is_row = columns.iter().all(|it| it.1.len() == 1);
+        let place = node.parent().filter(|_| is_row).unwrap_or(node);
+        let known = tables.iter_mut().find(|it| is_row && it.1 && it.0 == place);
+        match known {
+            Some((_, _, all)) => join(all, columns, true)?,
+            None => {
+                let mut all = Vec::new();
+                join(&mut all, columns, is_row)?;
+                tables.push((place, is_row, all));
+            }
+        }
+    }
+    Ok(tables.into_iter().map(|it| it.2).collect())
+}
+
+fn join(all: &mut Columns, more: Columns, is_row: bool) -> Result<(), Unfit> {
+    for (column, own) in more {
+        let before = all
+            .iter_mut()
+            .find(|it| is_row && it.0 == column && column.is_some());
+        match before {
+            Some(before) => before.1 = before.1.clone().joined(own)?,
+            None => all.push((column, own)),
+        }
+    }
+    Ok(())
+}
+
+/// The one table that `lists` make: one of them, or all together. Of several how many there are.
+fn the_table(mut lists: Vec<Columns>) -> Result<Columns, usize> {
+    let has = |list: &Columns, wanted: Column| list.iter().any(|it| it.0 == Some(wanted));
+    let is_anywhere = lists.iter().any(|it| has(it, Column::Reference));
+    for list in &mut lists {
+        list.retain(|it| it.0.is_some());
+        let is_here = has(list, Column::Reference);
+        let is_alone = list.iter().all(|it| it.0 == Some(Column::Nominal));
+        match is_here || (is_alone && is_anywhere) {
+            true => list.retain(|it| it.0 != Some(Column::Nominal)),
+            false => {
+                let nominal = list.iter_mut().filter(|it| it.0 == Some(Column::Nominal));
+                nominal.for_each(|it| it.0 = Some(Column::Reference));
+            }
+        }
+    }
+    let all: Columns = lists.iter().flatten().cloned().collect();
+    if most_alike(&all) <= 1 {
+        return Ok(all);
+    }
+    let is_whole = |it: &Columns| {
+        let kinds = kinds(it);
+        kinds.len() > 1
+            && kinds
+                .iter()
+                .any(|it| matches!(it, Column::Reference | Column::Measured))
+    };
+    let mut whole: Vec<Columns> = lists.into_iter().filter(is_whole).collect();
+    match (whole.as_slice(), is_whole(&all)) {
+        ([one], _) if most_alike(one) == 1 => Ok(whole.remove(0)),
+        ([], false) => Ok(Vec::new()),
+        ([] | [_], _) => Err(most_alike(&all)),
+        (several, _) => Err(several.len()),
+    }
+}
+
+fn kinds(columns: &Columns) -> Vec<Column> {
+    let mut kinds: Vec<Column> = Vec::new();
+    for column in columns.iter().filter_map(|it| it.0) {
+        if !kinds.contains(&column) {
+            kinds.push(column);
+        }
+    }
+    kinds
+}
+
+/// How many columns of one kind there are, of that which has the most.
+fn most_alike(columns: &Columns) -> usize {
+    let kinds = kinds(columns).into_iter();
+    let counts = kinds.map(|kind| columns.iter().filter(|it| it.0 == Some(kind)).count());
+    counts.max().unwrap_or_default()
 }
 
 /// The one value of light: what was measured of the laser.
@@ -146,7 +254,11 @@ fn wavelength(columns: &[(Option<Column>, Values)]) -> Result<Option<Figures>, U
         let is_measured = matches!(column, None | Some(Column::Measured));
         is_measured && own.values().iter().all(|it| is_light(metres(own, *it)))
     });
-    let all: Vec<_> = of_light.map(|it| &it.1).collect();
+    let mut all: Vec<_> = of_light.map(|it| &it.1).collect();
+    // The same light in hertz beside it says nothing more.
+    if all.iter().any(|it| it.unit.dimension == Dimension::Length) {
+        all.retain(|it| it.unit.dimension == Dimension::Length);
+    }
     let [own] = all.as_slice() else {
         return match all.as_slice() {
             [] => Ok(None),
@@ -230,7 +342,8 @@ fn table(
             .map(|(reference, measured)| reference - measured)
             .collect::<Vec<_>>()
     });
-    let u = match correction.or(error).and_then(Values::u) {
+    let of_correction = correction.and_then(Values::u);
+    let u = match of_correction.or_else(|| error.and_then(Values::u)) {
         Some(u) => u,
         None => compared_u(reference, measured, count)?,
     };
@@ -263,7 +376,7 @@ fn table(
     Ok(Some(Figures::Table(points)))
 }
 
-/// That of the difference of two columns.
+/// That of the difference of two columns; that of the reference alone is not what the instrument adds.
 fn compared_u(
     reference: Option<&Values>,
     measured: Option<&Values>,
@@ -274,7 +387,7 @@ fn compared_u(
         .flatten()
         .filter_map(Values::u)
         .collect();
-    if each.is_empty() {
+    if measured.and_then(Values::u).is_none() {
         return without_uncertainty();
     }
     let squares = |at: usize| each.iter().map(|it| it[at] * it[at]).sum::<f64>();
@@ -314,7 +427,9 @@ fn in_order(mut points: Vec<Point>) -> Result<Vec<Point>, Unfit> {
 }
 
 fn judge(points: &[Point], measurand: Measurand) -> Result<(), Unfit> {
-    let possible = measurand.possible();
+    let Some(possible) = measurand.possible() else {
+        return Ok(());
+    };
     let (unit, per) = measurand.unit();
     let (low, high) = possible.readings;
     for it in points {
@@ -343,4 +458,163 @@ fn judge(points: &[Point], measurand: Measurand) -> Result<(), Unfit> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::xml::parsed;
+    use super::*;
+
+    /// What a result with these lists says.
+    fn read(measurand: Measurand, lists: &str) -> Result<Option<Figures>, Unfit> {
+        let text = format!(
+            "<dcc:result xmlns:dcc=\"https://ptb.de/dcc\" xmlns:si=\"https://ptb.de/si\"><dcc:name><dcc:content>here\
+             </dcc:content></dcc:name><dcc:data>{lists}</dcc:data></dcc:result>"
+        );
+        let document = parsed(&text)?;
+        of_result(document.root_element(), measurand)
+    }
+
+    fn list(quantities: &[String]) -> String {
+        format!("<dcc:list>{}</dcc:list>", quantities.concat())
+    }
+
+    /// A column in degrees Celsius.
+    fn column(role: &str, values: &str, u: &str) -> String {
+        let u = match u {
+            "" => String::new(),
+            u => format!(
+                "<si:standardMUXMLList><si:valueStandardMUXMLList>{u}</si:valueStandardMUXMLList>\
+                          </si:standardMUXMLList>"
+            ),
+        };
+        format!(
+            "<dcc:quantity refType=\"basic_{role}\"><si:realListXMLList><si:valueXMLList>{values}</si:valueXMLList>\
+             <si:unitXMLList>\\degreecelsius</si:unitXMLList>{u}</si:realListXMLList></dcc:quantity>"
+        )
+    }
+
+    fn light(value: &str, unit: &str, u: &str) -> String {
+        format!(
+            "<dcc:quantity refType=\"basic_measuredValue\"><si:real><si:value>{value}</si:value><si:unit>{unit}</si:unit>\
+             <si:standardMU><si:valueStandardMU>{u}</si:valueStandardMU></si:standardMU></si:real></dcc:quantity>"
+        )
+    }
+
+    #[track_caller]
+    fn check(lists: &str, expected: &[[f64; 3]]) {
+        let seen = read(Measurand::Temperature, lists).unwrap().unwrap();
+        let Figures::Table(points) = seen else {
+            panic!("{seen:?}")
+        };
+        assert_eq!(points.len(), expected.len(), "{points:?}");
+        for (it, expected) in points.iter().zip(expected) {
+            let seen = [it.reading, it.correction, it.u];
+            let alike = seen
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-12);
+            assert!(alike, "{seen:?} is not {expected:?}");
+        }
+    }
+
+    #[track_caller]
+    fn refused(lists: &str, says: &str) {
+        let unfit = read(Measurand::Temperature, lists).unwrap_err();
+        assert!(unfit.cause.contains(says), "{}", unfit.cause);
+    }
+
+    fn table_of(readings: &str, errors: &str) -> Vec<String> {
+        vec![
+            column("measuredValue", readings, ""),
+            column("measurementError", errors, "0.01"),
+        ]
+    }
+
+    #[test]
+    fn two_channels_of_one_result_are_never_joined() {
+        let (one, other) = (
+            table_of("10 20", "0.1 0.2"),
+            table_of("10.5 20.5", "0.3 0.4"),
+        );
+        check(&list(&one), &[[10.0, -0.1, 0.01], [20.0, -0.2, 0.01]]);
+        let two = "its result `here` says 2 tables; which is meant?";
+        refused(&(list(&one) + &list(&other)), two);
+        refused(&list(&[list(&one), list(&other)]), two);
+        refused(&list(&[one, other].concat()), two);
+        // Of both the reference once.
+        let (one, other) = ("10.1 20.1", "10.2 20.2");
+        let measured = |it: &str| list(&[column("measuredValue", it, "0.01 0.01")]);
+        let reference = column("referenceValue", "10 20", "");
+        refused(&list(&[reference, measured(one), measured(other)]), two);
+    }
+
+    #[test]
+    fn rows_of_one_list_are_joined_and_those_of_two_are_not() {
+        let rows = |rows: &[(&str, &str)]| {
+            let each = rows.iter().map(|it| list(&table_of(it.0, it.1)));
+            list(&each.collect::<Vec<_>>())
+        };
+        let before = rows(&[("20", "0.2"), ("10", "0.1")]);
+        check(&before, &[[10.0, -0.1, 0.01], [20.0, -0.2, 0.01]]);
+        let after = rows(&[("10.5", "0.0"), ("20.5", "0.0")]);
+        refused(&(before + &after), "says 2 tables");
+    }
+
+    #[test]
+    fn columns_in_lists_of_their_own_are_one_table_and_a_nominal_value_counts_where_nothing_else_is()
+     {
+        let each = table_of("10 20", "0.1 0.2")
+            .into_iter()
+            .map(|it| list(&[it]));
+        let expected = [[10.0, -0.1, 0.01], [20.0, -0.2, 0.01]];
+        check(&each.collect::<String>(), &expected);
+        let with = |role: &str| vec![column(role, "9.9 19.8", "")];
+        let nominal = vec![column("nominalValue", "10 20", "")];
+        let measured = vec![column("measuredValue", "10 20", "0.01 0.01")];
+        check(
+            &list(&[with("nominalValue"), measured.clone()].concat()),
+            &expected,
+        );
+        check(
+            &list(&[nominal, with("referenceValue"), measured].concat()),
+            &expected,
+        );
+    }
+
+    #[test]
+    fn the_uncertainty_is_that_of_the_correction_of_the_error_or_of_the_measured_values() {
+        let all = |correction: &str, error: &str, measured: &str| {
+            list(&[
+                column("referenceValue", "10", "0.001"),
+                column("measuredValue", "10.1", measured),
+                column("measurementError", "0.1", error),
+                column("correction", "-0.1", correction),
+            ])
+        };
+        check(&all("0.02", "0.03", "0.04"), &[[10.1, -0.1, 0.02]]);
+        check(&all("", "0.03", "0.04"), &[[10.1, -0.1, 0.03]]);
+        let both = 0.04_f64.hypot(0.001);
+        check(&all("", "", "0.04"), &[[10.1, -0.1, both]]);
+        refused(&all("", "", ""), "states no uncertainty");
+    }
+
+    #[test]
+    fn a_laser_is_taken_in_metres_where_its_frequency_stands_beside() {
+        let metres = light("632.991", "\\nano\\metre", "0.000001");
+        let hertz = light("473.6127", "\\tera\\hertz", "0.1");
+        for both in [[&metres, &hertz], [&hertz, &metres]] {
+            let both = both.map(String::clone);
+            let lists = [list(&both), both.map(|it| list(&[it])).concat()];
+            for lists in lists {
+                let Some(Figures::Value { value, u }) =
+                    read(Measurand::Wavelength, &lists).unwrap()
+                else {
+                    panic!("no wavelength")
+                };
+                assert!((value - 632.991e-9).abs() < 1e-20, "{value}");
+                assert!((u - 1e-15).abs() < 1e-24, "{u}");
+            }
+        }
+    }
 }
