@@ -78,7 +78,11 @@ impl Clock {
             self.first_s = None;
         } else if let Some(at_s) = entry.get("at_s").and_then(Node::number) {
             let first_s = *self.first_s.get_or_insert(at_s);
-            self.last_us = self.begun_us + ((at_s - first_s) * 1e6).round() as i64;
+            let gone_us = ((at_s - first_s) * 1e6).round() as i64;
+            // A clock that has gone on beyond all calendars says nothing.
+            let at_us = self.begun_us.checked_add(gone_us);
+            let at_us = at_us.filter(|it| Timestamp::from_microsecond(*it).is_ok());
+            self.last_us = at_us.unwrap_or(self.last_us);
         } else if let Some(at_us) = at("at") {
             self.last_us = at_us;
         }
@@ -128,5 +132,22 @@ mod tests {
             r#"{"entry":"sighted","at":"2026-01-01T02:00:00Z"}"#,
             7200.0,
         );
+    }
+
+    #[test]
+    fn a_clock_that_is_beyond_all_calendars_is_not_believed() {
+        let mut clock = Clock::default();
+        let it = &mut clock;
+        check(
+            it,
+            r#"{"entry":"header","started":"2026-01-01T00:00:00Z"}"#,
+            0.0,
+        );
+        check(it, r#"{"entry":"point","at_s":1.0}"#, 0.0);
+        for far in ["1e12", "-1e12", "1e300", "-1e300"] {
+            let entry = format!(r#"{{"entry":"point","at_s":{far}}}"#);
+            check(it, &entry, 0.0);
+        }
+        check(it, r#"{"entry":"point","at_s":2.5}"#, 1.5);
     }
 }

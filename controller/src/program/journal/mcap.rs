@@ -167,7 +167,10 @@ fn about(entries: &[Entry], channel: &Channel<'_>) -> Vec<u8> {
 }
 
 fn time_ns(entry: &Entry) -> u64 {
-    u64::try_from(entry.time_us).unwrap_or_default() * 1000
+    // Its nanoseconds end in the year 2554.
+    u64::try_from(entry.time_us)
+        .unwrap_or_default()
+        .saturating_mul(1000)
 }
 
 /// The first and the last time.

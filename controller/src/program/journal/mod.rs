@@ -122,8 +122,7 @@ fn export(args: &ExportArgs, output: Output) -> Ended {
     match (args.is_printed(), tables.as_slice()) {
         (false, tables) => as_files(args, tables, output),
         (true, [table]) => {
-            // A closed pipe (`| head`) is the reader's right.
-            let _ = io::stdout().lock().write_all(csv_of(table).as_bytes());
+            printed(&mut io::stdout().lock(), csv_of(table).as_bytes())?;
             Ok(None)
         }
         (true, tables) => Err(Failure::Usage {
@@ -133,6 +132,15 @@ fn export(args: &ExportArgs, output: Output) -> Ended {
             ),
             help: format!("add --table with one of {}", names(tables)),
         }),
+    }
+}
+
+/// Writes `bytes` to `out`, all of them.
+fn printed(out: &mut impl io::Write, bytes: &[u8]) -> Result<(), Failure> {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        // A closed pipe (`| head`) is the reader's right.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written.map_err(failed(Path::new(STANDARD_OUTPUT))),
     }
 }
 
@@ -236,5 +244,31 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     move |source| Failure::File {
         path: path.to_owned(),
         source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What takes nothing any more, for a reason.
+    struct Full(io::ErrorKind);
+
+    impl io::Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Err(self.0.into())
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_not_whole_where_it_is_printed_is_a_failure_and_a_closed_pipe_is_none() {
+        let print = |kind| printed(&mut Full(kind), b"a,b\n");
+        assert!(print(io::ErrorKind::BrokenPipe).is_ok());
+        let failure = print(io::ErrorKind::StorageFull).unwrap_err();
+        assert!(matches!(failure, Failure::File { .. }), "{failure}");
     }
 }
