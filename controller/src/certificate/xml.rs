@@ -13,12 +13,20 @@ pub(super) const BYTES_MAX: u64 = 4 << 20;
 const NODES_MAX: u32 = 200_000;
 /// A quantity in lists of lists is some 15 elements deep.
 const DEPTH_MAX: usize = 64;
+/// Its longest tag has some hundred bytes of namespaces. The parser compares each attribute with each other one of its tag.
+const TAG_MAX: usize = 8 << 10;
 
 /// The tree of `text`.
 ///
 /// # Errors
 /// When it is no XML, declares something, or is beyond a limit.
 pub(super) fn parsed(text: &str) -> Result<Document<'_>, Unfit> {
+    if has_long_tag(text) {
+        return unfit(
+            format!("one of its tags is longer than {} KiB", TAG_MAX >> 10),
+            "no certificate has such; ask the laboratory for it as it was issued",
+        );
+    }
     let options = ParsingOptions {
         allow_dtd: false,
         nodes_limit: NODES_MAX,
@@ -39,6 +47,44 @@ pub(super) fn parsed(text: &str) -> Result<Document<'_>, Unfit> {
         ),
         false => Ok(document),
     }
+}
+
+/// Whether there is one before anything that is no XML.
+fn has_long_tag(text: &str) -> bool {
+    let mut rest = text;
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let others = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+        let other = others.iter().find(|it| rest.starts_with(it.0));
+        let length = match other {
+            Some((begin, end)) => {
+                let end = rest[begin.len()..].find(end).map(|it| it + end.len());
+                end.map(|it| begin.len() + it)
+            }
+            None => tag_length(rest),
+        };
+        match length {
+            Some(length) if other.is_none() && length > TAG_MAX => return true,
+            Some(length) => rest = &rest[length..],
+            // It never ends: the parser says so of what is no tag.
+            None => return other.is_none() && rest.len() > TAG_MAX,
+        }
+    }
+    false
+}
+
+/// Up to the `>` that is not quoted.
+fn tag_length(text: &str) -> Option<usize> {
+    let mut quote = None;
+    let end = text.bytes().position(|it| {
+        match (quote, it) {
+            (Some(open), _) if open == it => quote = None,
+            (None, b'"' | b'\'') => quote = Some(it),
+            _ => {}
+        }
+        quote.is_none() && it == b'>'
+    });
+    Some(end? + 1)
 }
 
 pub(super) fn is(node: Node<'_, '_>, space: &str, name: &str) -> bool {
@@ -86,4 +132,30 @@ pub(super) fn text(node: Node<'_, '_>) -> String {
 pub(super) fn name_of(node: Node<'_, '_>) -> String {
     let content = at(node, DCC, &["name", "content"]);
     content.map(text).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tag_of_hundreds_of_thousands_of_attributes_is_refused_at_once() {
+        let many: String = (0..300_000).map(|at| format!(" a{at}=\"\"")).collect();
+        // What looks like an end of a tag or like a comment in it is none.
+        for before in ["", " b=\">\" c='\">' d=\"<!--\""] {
+            for after in ["/>", ""] {
+                let text =
+                    format!("<!-- > \" --><?x '?><a><![CDATA[<']]><b{before}{many}{after}</a>");
+                let unfit = parsed(&text).unwrap_err();
+                assert!(
+                    unfit.cause.contains("tags is longer than"),
+                    "{}",
+                    unfit.cause
+                );
+            }
+        }
+        let picture = "x".repeat(100_000);
+        let text = format!("<a b='>'><!-- {picture} --><![CDATA[{picture}]]>{picture}</a>");
+        assert!(parsed(&text).is_ok());
+    }
 }
