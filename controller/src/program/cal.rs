@@ -150,6 +150,9 @@ pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure>
         "calibration {id}\n  machine {} (stage {}), axis {}, made {} by {}\n  from {}, {lines}",
         head.machine, head.stage_serial, head.axis, head.created, head.program, head.source,
     );
+    let certificates = head.instrument.certificates.iter();
+    let certificates = certificates.map(|it| format!("\n  {}", it.text()));
+    let text = text + &certificates.collect::<String>();
     let text = match head.instrument.warning() {
         Some(warning) => format!("{text}\nwarning: its readings were {warning}"),
         None => text,

@@ -1,6 +1,7 @@
 //! `[volumetric]`: three linear axes whose errors are corrected throughout the work volume while
 //! the machine works (system S4). Each key's suffix is its unit.
 
+use machine::records::CertificateRecord;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -83,6 +84,9 @@ pub struct VolumetricConfig {
     pub compensation: VolumetricCompensationConfig,
 }
 
+/// How the keys of the certificates of thermometers begin.
+pub(crate) const THERMOMETERS: &str = "volumetric.";
+
 /// Where the certificate of a thermometer stands in the file.
 fn of_thermometer(at: usize) -> String {
     format!("volumetric.temperature.{at}.certificate")
@@ -116,6 +120,16 @@ impl VolumetricConfig {
             let own = it.certificate.as_ref()?;
             Some((of_thermometer(at), Measurand::Temperature, own))
         })
+    }
+
+    /// What records say of them.
+    pub(crate) fn certificate_records(&self) -> Vec<CertificateRecord> {
+        let each = self.temperature.iter().enumerate();
+        let records = each.filter_map(|(at, it)| {
+            let certified = it.certified()?;
+            Some(certified.record(&format!("temperature {at}")))
+        });
+        records.collect()
     }
 
     /// The cameras that see beams.

@@ -16,8 +16,9 @@ use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
-use crate::run::utc_now;
+use crate::run::{require_certified, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store, short};
+use crate::volumetric::config::THERMOMETERS;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::{DetectorPlace, RollReader, slide_of};
 use crate::volumetric::settings::{beam_drift, drift_record, eye, volume_axis};
@@ -115,6 +116,7 @@ impl WorkVolume<'_> {
     /// than they were measured at by more than is permitted, a detector is in trouble, or anything
     /// stops the machine. What was in use before stays in use then.
     pub fn reference(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
+        require_certified(self.core.config, THERMOMETERS)?;
         let geometry = measured_geometry(store)?;
         let errors = store.load::<GeometryContent>(&geometry)?.content;
         let then = errors.temperatures();
@@ -144,11 +146,12 @@ impl WorkVolume<'_> {
         source: &str,
     ) -> Result<VolumetricReferenced, Failure> {
         references.content.geometry = geometry.to_owned();
-        let head = RecordHead {
+        let mut head = RecordHead {
             created: utc_now(),
             source: source.to_owned(),
             ..self.this_volume(REFERENCES)?
         };
+        head.instrument.certificates = self.config.certificate_records();
         let content = references.content.clone();
         let id = store.save(&CalibrationRecord { head, content })?;
         Ok(VolumetricReferenced { id, references })

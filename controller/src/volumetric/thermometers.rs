@@ -24,7 +24,7 @@ fn newest(seen: &[Option<ThermometerSample>], place: usize) -> Option<(Time, Cel
 }
 
 /// What it shows, with what its certificate corrects.
-fn right(shown: Celsius, certified: Option<&Certified>) -> Celsius {
+pub(super) fn right(shown: Celsius, certified: Option<&Certified>) -> Celsius {
     let correction = certified.map_or(0.0, |it| it.figures.correction(shown.value()));
     Celsius(shown.value() + correction)
 }
@@ -225,6 +225,7 @@ mod tests {
     use core::time::Duration;
 
     use super::*;
+    use crate::certificate::{CertificateConfig, Figures, Point};
     use crate::volumetric::VolumetricConfig;
     use crate::volumetric::settings::thermal;
 
@@ -416,6 +417,41 @@ mod tests {
         fails(&[with(None)], 4, |it| {
             matches!(it, Trouble::Implausible { .. })
         });
+    }
+
+    /// It shows 0.2 K too much at 20 °C: 20.0 on it are 19.8 °C.
+    #[test]
+    fn what_a_thermometer_shows_too_much_is_taken_away() {
+        let point = Point {
+            reading: 20.0,
+            correction: -0.2,
+            u: 0.01,
+        };
+        let certified = Certified {
+            identifier: "K".into(),
+            laboratory: "L".into(),
+            serial_number: "T".into(),
+            calibrated: jiff::civil::date(2026, 1, 1),
+            valid_until: jiff::civil::date(2027, 1, 1),
+            hash: "ab".into(),
+            figures: Figures::Table(vec![point]),
+        };
+        assert_eq!(right(Celsius(20.0), Some(&certified)), Celsius(19.8));
+        assert_eq!(right(Celsius(20.0), None), Celsius(20.0));
+        // Both that of the certificate and that of the key count, wherever it is asked for.
+        let (_, own) = shipped();
+        let mut thermometer = own.temperature[0].clone();
+        thermometer.standard_uncertainty_k = 0.01;
+        thermometer.certificate = Some(CertificateConfig {
+            file: "t.xml".into(),
+            serial_number: "T".into(),
+            result: None,
+            valid_months: None,
+            remind_days: 30,
+            certified: Some(Arc::new(certified)),
+        });
+        let u = thermometer.u_kelvin();
+        assert!((u - 0.01 * 2.0_f64.sqrt()).abs() < 1e-12, "{u}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::place_of_temperature;
 use crate::volumetric::line::{Line, LineOperator, LineOptics, LineReadout, LineTask};
 use crate::volumetric::settings::point_of_mm;
+use crate::volumetric::thermometers::right;
 use crate::volumetric::{LineReadingEntry, VolumeCheckEntry, metres};
 use crate::volumetric::{Mover, VolumetricCorrection, VolumetricFailure};
 use crate::volumetric::{VolumeEntry, VolumeLog};
@@ -268,7 +269,8 @@ impl WorkVolume<'_> {
         let each = config.temperature.iter().map(|it| {
             let place = place_of_temperature(self.core.config, &it.analog, it.channel);
             let sample = shown.get(place).copied().flatten()?;
-            sample.celsius.map(|it| it.value())
+            let shown = sample.celsius?;
+            Some(right(shown, it.certified().as_deref()).value())
         });
         each.collect()
     }

@@ -166,7 +166,10 @@ fn the_text_of_a_certificate_says_its_result_where_one_is_named() {
         version_4::text(&config, "first line\nbody\n").unwrap()
     };
     let before = text(None);
-    assert!(before.ends_with("body\nvolumetric.temperature.0.certificate = \"ab\"\n"), "{before}");
+    assert!(
+        before.ends_with("body\nvolumetric.temperature.0.certificate = \"ab\"\n"),
+        "{before}"
+    );
     assert_eq!(
         text(Some("as left")),
         before + "volumetric.temperature.0.certificate.result = \"as left\"\n"

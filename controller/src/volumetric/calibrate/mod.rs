@@ -50,6 +50,7 @@ use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
+use crate::volumetric::config::THERMOMETERS;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
 use crate::volumetric::reference::References;
@@ -202,7 +203,8 @@ impl WorkVolume<'_> {
             let instrument = instrument.clone();
             return Err(VolumetricFailure::NoInstrument { instrument }.into());
         }
-        require_certified(self.core.config, "")?;
+        require_certified(self.core.config, &format!("instrument.{instrument}."))?;
+        require_certified(self.core.config, THERMOMETERS)?;
         let head = self.this_volume(GEOMETRY)?;
         Ok(JournalHeader {
             schema_version: SCHEMA_VERSION,
@@ -226,13 +228,15 @@ impl WorkVolume<'_> {
         })
     }
 
-    /// What the records say of the instrument that reads lines.
+    /// What the records say of the instrument that reads lines, with the certificates of the thermometers.
     fn lines_instrument(&self, name: &str) -> InstrumentRecord {
         let off = self.core.config.instrument[name].switched_off_of_lines();
-        InstrumentRecord {
-            switched_off: off.iter().map(|it| it.name.to_owned()).collect(),
-            ..self.core.instrument_record(name)
-        }
+        let mut record = self.core.instrument_record(name);
+        record.switched_off = off.iter().map(|it| it.name.to_owned()).collect();
+        record
+            .certificates
+            .extend(self.config.certificate_records());
+        record
     }
 
     fn read_lines(
