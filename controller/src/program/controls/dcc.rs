@@ -4,7 +4,7 @@
 //! (`https://ptb.de/si`) for values with units and standard uncertainties.
 //!
 //! It says what the record says, and that nobody has accredited whoever issues it. Who that is, the record does not
-//! know: it is asked for. Absent: a signature; the certificates of the instruments.
+//! know: it is asked for. The certificates of what measured are named. Absent: a signature; what these certificates say.
 
 use core::f64::consts::TAU;
 
