@@ -24,7 +24,6 @@ pub use task::{Found, Task};
 pub use teller::{Teller, Told};
 pub use together::{GroupMove, GroupMoved, Judge, Part, PartMoved, Place};
 
-#[cfg(feature = "program")]
 pub(crate) use choice::write;
 pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;

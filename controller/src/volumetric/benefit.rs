@@ -5,9 +5,10 @@ use units::Metres;
 
 use crate::failure::Failure;
 use crate::store::{Store, short};
+use crate::volumetric::GEOMETRY;
+use crate::volumetric::chosen::{use_geometry, use_nothing};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::verify::{VolumetricVerified, from_the_first};
-use crate::volumetric::{BeamReferencesContent, GEOMETRY, REFERENCES};
 use crate::worse::likely_cause;
 
 impl WorkVolume<'_> {
@@ -48,19 +49,15 @@ impl WorkVolume<'_> {
     }
 }
 
-/// The calibration before `id` is used again, with the references that count from it, or none; its name.
-fn fall_back(store: &Store, id: &str) -> Result<Option<String>, Failure> {
+/// The calibration before `id` is used again, with what counts from it, or none; its name.
+pub(super) fn fall_back(store: &Store, id: &str) -> Result<Option<String>, Failure> {
     if store.active(GEOMETRY)?.current.as_deref() != Some(id) {
         return Ok(None);
     }
     let in_use = store.retire(GEOMETRY)?;
-    let mut references = store.active(REFERENCES)?.current;
-    while let Some(own) = &references {
-        let record = store.load::<BeamReferencesContent>(own)?;
-        if Some(&record.content.geometry) == in_use.as_ref() {
-            break;
-        }
-        references = store.retire(REFERENCES)?;
+    match &in_use {
+        Some(earlier) => use_geometry(store, earlier)?,
+        None => use_nothing(store)?,
     }
     Ok(in_use)
 }

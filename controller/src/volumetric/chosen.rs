@@ -8,7 +8,7 @@ use machine::records::{Content, Store};
 
 use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::runs::Change;
+use crate::runs::{Change, write};
 use crate::volumetric::state::{VolumetricRecords, check_memory, check_references, used};
 use crate::volumetric::{
     BeamReferencesContent, GEOMETRY, MemoryName, REFERENCES, StateMemoryContent,
@@ -55,6 +55,34 @@ pub(super) fn with_companions(store: &Store, chosen: Vec<Change>) -> Result<Vec<
     }
     check(store, &chosen, &records)?;
     Ok(after.changes)
+}
+
+/// Uses `geometry` from now on, and what counts from it.
+///
+/// # Errors
+/// When something cannot be read or written.
+pub(super) fn use_geometry(store: &Store, geometry: &str) -> Result<(), Failure> {
+    let chosen = Change {
+        pointer: GEOMETRY.to_owned(),
+        id: Some(geometry.to_owned()),
+        is_earlier: false,
+    };
+    let changes = with_companions(store, vec![chosen])?;
+    Ok(write(store, &changes)?)
+}
+
+/// Uses nothing that counts from errors any more: there are none.
+///
+/// # Errors
+/// When something cannot be read or written.
+pub(super) fn use_nothing(store: &Store) -> Result<(), Failure> {
+    let mut changes = Vec::new();
+    for pointer in pointers() {
+        if store.active(&pointer)?.current.is_some() {
+            changes.push(Change::to_nothing(&pointer));
+        }
+    }
+    Ok(write(store, &changes)?)
 }
 
 /// That what was chosen itself counts from what is used then.

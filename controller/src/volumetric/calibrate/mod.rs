@@ -50,6 +50,7 @@ use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
+use crate::volumetric::chosen::use_geometry;
 use crate::volumetric::config::THERMOMETERS;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
@@ -57,7 +58,7 @@ use crate::volumetric::reference::References;
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
-use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
+use crate::volumetric::{GEOMETRY, VolumetricFailure};
 use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
@@ -376,8 +377,8 @@ impl WorkVolume<'_> {
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
         if is_used {
-            store.activate(REFERENCES, &references.id)?;
-            store.activate(GEOMETRY, &id)?;
+            // With its references, and without memories that count from others.
+            use_geometry(store, &id)?;
         }
         Ok(VolumetricCalibrated {
             id,

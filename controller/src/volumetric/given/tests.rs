@@ -5,6 +5,8 @@ use super::*;
 use crate::config::parse;
 use crate::edit::with_spot_cameras;
 use crate::stores::store_in;
+use crate::volumetric::benefit::fall_back;
+use crate::volumetric::chosen::use_geometry;
 use crate::volumetric::{GEOMETRY, GeometryContent, GivenName};
 
 const CONFIG: &str = include_str!("../../../../configs/machines/volumetric.toml");
@@ -246,23 +248,72 @@ fn without_measured_errors_there_are_no_references() {
     assert_eq!(known.in_use(), None);
 }
 
+/// The second memory, counting from `references` and in use; its name.
+fn remembered(known: &Known, references: &str) -> String {
+    let pointer = memory_pointer(MemoryName::Second);
+    let content = StateMemoryContent {
+        memory: MemoryName::Second,
+        references: references.to_owned(),
+        ..StateMemoryContent::default()
+    };
+    let head = head(pointer);
+    let record = CalibrationRecord { head, content };
+    let id = known.store.save(&record).unwrap();
+    known.store.activate(pointer, &id).unwrap();
+    id
+}
+
 /// What a memory keeps counts from the references that it was recorded with.
 #[test]
 fn memories_that_count_from_other_references_are_named() {
     let known = known();
     let before = known.import(&table([0.0, 0.0]), "r.csv").unwrap();
-    let which = MemoryName::Second;
-    let content = StateMemoryContent {
-        memory: which,
-        references: before.id.clone(),
-        ..StateMemoryContent::default()
-    };
-    let head = head(memory_pointer(which));
-    let id = known
-        .store
-        .save(&CalibrationRecord { head, content })
-        .unwrap();
-    known.store.activate(memory_pointer(which), &id).unwrap();
+    let id = remembered(&known, &before.id);
     let again = known.import(&table([1.0, 0.0]), "r.csv").unwrap();
-    assert_eq!(again.foreign, [(which, id)]);
+    assert_eq!(again.foreign, [(MemoryName::Second, id)]);
+}
+
+#[test]
+fn errors_that_are_found_or_fallen_back_to_leave_nothing_in_use_that_counts_from_others() {
+    let known = known();
+    let in_use = |pointer: &str| known.store.active(pointer).unwrap().current;
+    let memory = memory_pointer(MemoryName::Second);
+    let first = in_use(GEOMETRY).unwrap();
+    let of_first = known.import(&table([0.0, 0.0]), "r.csv").unwrap().id;
+    let of_old = remembered(&known, &of_first);
+
+    let content = GeometryContent::default();
+    let newer = RecordHead {
+        created: "2026-01-02T00:00:00Z".into(),
+        ..head(GEOMETRY)
+    };
+    let record = CalibrationRecord {
+        head: newer,
+        content,
+    };
+    let second = known.store.save(&record).unwrap();
+    let content = BeamReferencesContent {
+        geometry: second.clone(),
+        ..BeamReferencesContent::default()
+    };
+    let head = head(REFERENCES);
+    let record = CalibrationRecord { head, content };
+    let of_second = known.store.save(&record).unwrap();
+    use_geometry(&known.store, &second).unwrap();
+    assert_eq!(in_use(GEOMETRY).as_ref(), Some(&second));
+    assert_eq!(known.in_use().as_ref(), Some(&of_second));
+    assert_eq!(in_use(memory), None);
+
+    remembered(&known, &of_second);
+    assert_eq!(
+        fall_back(&known.store, &second).unwrap().as_ref(),
+        Some(&first)
+    );
+    assert_eq!(in_use(GEOMETRY).as_ref(), Some(&first));
+    assert_eq!(known.in_use().as_ref(), Some(&of_first));
+    assert_eq!(in_use(memory), Some(of_old));
+
+    assert_eq!(fall_back(&known.store, &first).unwrap(), None);
+    assert_eq!((in_use(GEOMETRY), known.in_use()), (None, None));
+    assert_eq!(in_use(memory), None);
 }
