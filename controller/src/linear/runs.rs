@@ -127,11 +127,21 @@ fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
 
 fn do_job(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     let words = work.words::<LinearTeller>();
-    let job = task.job.as_ref().and_then(|it| it.of::<Job>());
-    let job = job.ok_or_else(|| Failure::Usage {
+    let judged = task.job.as_ref();
+    let judged = judged.and_then(|it| Some((it.of::<Job>()?, &it.calibration)));
+    let (job, calibration) = judged.ok_or_else(|| Failure::Usage {
         what: "a job without points".into(),
         help: "give them".into(),
     })?;
+    // What is beyond its range was refused with that one, and may lie elsewhere with another.
+    if work.store.active(axis)?.current.as_ref() != Some(calibration) {
+        return Err(Failure::Usage {
+            what: format!(
+                "axis {axis} uses another calibration than the one that this job was judged with"
+            ),
+            help: "plan it again".into(),
+        });
+    }
     let mut person = Asking(work.person);
     let mut stage = work.machine.linear(axis)?;
     let done = match &task.resume {

@@ -17,15 +17,22 @@ pub struct JudgedJob {
     pub axis: String,
     /// What it will do.
     pub planned: Planned,
+    /// The calibration that it was judged with.
+    pub(crate) calibration: String,
     /// What its kind made of it.
     job: Arc<dyn Any + Send + Sync>,
 }
 
 impl JudgedJob {
-    pub(crate) fn new(axis: &str, planned: Planned, job: impl Any + Send + Sync) -> Self {
+    pub(crate) fn new(
+        axis: &str,
+        (planned, calibration): (Planned, String),
+        job: impl Any + Send + Sync,
+    ) -> Self {
         Self {
             axis: axis.to_owned(),
             planned,
+            calibration,
             job: Arc::new(job),
         }
     }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState};
 use tests::Edit;
 
-use super::{Bed, anna, bert, to, with_zeroed_stage};
+use super::{Bed, anna, bert, to, with_zeroed_stage, with_zeroed_stage_in_process};
 use crate::client::PATIENCE;
 
 const JOB: &str = r#"schema_version = 1
@@ -159,5 +159,20 @@ fn a_job_that_is_paused_goes_on_at_the_point_that_was_not_left_and_as_the_same_j
             (&run.result["points_before"], &run.result["points"]),
             (&2.into(), &2.into())
         );
+    });
+}
+
+#[test]
+fn a_job_that_was_judged_with_another_calibration_is_not_begun() {
+    with_zeroed_stage_in_process(|bed| {
+        bed.calibrates();
+        let id = bed.client.plan(&anna(), &job(JOB)).unwrap();
+        bed.calibrates();
+        bed.client.start(&anna(), &id).unwrap();
+        let run = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Failed, "{run:?}");
+        let cause = run.cause.unwrap().cause;
+        assert!(cause.contains("uses another calibration"), "{cause}");
+        assert_eq!(run.steps_done, 0);
     });
 }

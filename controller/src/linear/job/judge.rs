@@ -27,7 +27,8 @@ pub(crate) fn job_judge(config: MachineConfig, hash: ConfigHash) -> JobJudge {
         }
         let speed = config.axis[&job.axis].motion.speed_mm_per_s;
         let planned = planned(&job, &plan, MetresPerSecond(speed * 1e-3));
-        Ok(JudgedJob::new(&job.axis.clone(), planned, job))
+        let axis = job.axis.clone();
+        Ok(JudgedJob::new(&axis, (planned, plan.calibration), job))
     })
 }
 
