@@ -50,7 +50,7 @@ impl VolumePathJudge {
             help: "nothing was moved; the columns are time_s,x_mm,y_mm,z_mm; see README.md".into(),
         })?;
         let checked = self.mover.check_path(&path.points);
-        checked.map_err(|source| refused(at_corner(source, &path)))?;
+        checked.map_err(|source| refused(at_corner(source, &path, engine.period())))?;
         if is_corrected {
             for (point, period) in path.points.iter().zip(0..) {
                 let place = Point::new(point[0], point[1], point[2]);
@@ -63,8 +63,11 @@ impl VolumePathJudge {
     }
 }
 
+/// A jerk is told by so many periods.
+const JERK_OVER: f64 = 3.0;
+
 /// Why `path` is refused: where it is at a corner that the axes cannot follow, what they could.
-fn at_corner(source: PushError, path: &CsvPath) -> PathRefusal {
+fn at_corner(source: PushError, path: &CsvPath, period: Duration) -> PathRefusal {
     let PushError::Refused(point) = &source else {
         return source.into();
     };
@@ -76,7 +79,10 @@ fn at_corner(source: PushError, path: &CsvPath) -> PathRefusal {
         return source.into();
     }
     let off = |at_s: f64| (at_s - point.at_s).abs();
+    // What is refused elsewhere is not about a corner; a jerk shows with the points after it.
+    let shows = JERK_OVER * period.as_secs_f64();
     let corners = path.tight.iter();
+    let corners = corners.filter(|it| off(it.at_s) <= it.half_s + shows);
     let nearest = corners.min_by(|one, other| off(one.at_s).total_cmp(&off(other.at_s)));
     match nearest {
         Some(corner) => PathRefusal::Corner {

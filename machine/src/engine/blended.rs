@@ -45,6 +45,8 @@ pub struct TightCorner {
     pub line: usize,
     /// When the path passes it, in seconds from its beginning.
     pub at_s: f64,
+    /// So many seconds before and after that it is rounded.
+    pub half_s: f64,
     /// How far from it the path would have to pass.
     pub wants: Metres,
 }
@@ -182,6 +184,7 @@ impl<'a> Blended<'a> {
         let told = corners.map(|(row, (step, line))| TightCorner {
             line: *line,
             at_s: self.passes(row),
+            half_s: step.half,
             wants: Metres::from_mm(CORNER * step.wanted * step.change),
         });
         told.collect()

@@ -98,11 +98,14 @@ pub fn read_path(text: &str, form: &PathForm<'_>) -> Result<CsvPath, CsvError> {
 /// What is asked for, or said in the file.
 fn join_of(rows: &Rows, asked: Option<Join>) -> Result<Join, CsvError> {
     match (asked, rows.join) {
-        (Some(asked), Some((seen, line))) if asked != seen => Err(CsvError {
-            line,
-            column: None,
-            fault: CsvFault::OtherJoin { asked, seen },
-        }),
+        // As they are shown: 50um is 0.05mm.
+        (Some(asked), Some((seen, line))) if asked.to_string() != seen.to_string() => {
+            Err(CsvError {
+                line,
+                column: None,
+                fault: CsvFault::OtherJoin { asked, seen },
+            })
+        }
         (asked, said) => Ok(asked.or(said.map(|it| it.0)).unwrap_or(Join::Spline)),
     }
 }
@@ -279,6 +282,24 @@ mod tests {
             let expected = cubic(at as f64 * 0.01);
             assert!((point[0].mm() - expected).abs() < 1e-9, "{at}");
         }
+    }
+
+    #[test]
+    fn a_join_is_asked_for_in_any_unit() {
+        let axes = ["x", "y"].map(str::to_owned);
+        let limits = [AxisLimits::default(); 2];
+        let form = |blend: f64| PathForm {
+            axes: &axes,
+            limits: &limits,
+            period: MS,
+            join: Some(Join::Linear {
+                blend: Metres::from_um(blend),
+            }),
+        };
+        let text = "# join: linear 0.05mm\ntime_s,x_mm,y_mm\n0,0,0\n1,1,1\n";
+        assert!(read_path(text, &form(50.0)).is_ok());
+        let other = read_path(text, &form(51.0)).unwrap_err();
+        assert_eq!(other.line, 1, "{other}");
     }
 
     #[test]
