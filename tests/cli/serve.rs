@@ -172,6 +172,12 @@ fn the_verbs_of_the_cycle_go_through_a_service_that_keeps_the_machine() {
             beyond["error"].to_string().contains("soft limit"),
             "{beyond}"
         );
+        for option in ["--no-activate", "--verify", "--accept-drift"] {
+            let words = ["calibrate", "machine.toml", option, "--resume"];
+            let refused = bench.run(&words).with_code(2);
+            let said = refused["error"].to_string();
+            assert!(said.contains(&format!("{option} with --resume")), "{said}");
+        }
         let resumed = bench.run(&["calibrate", "machine.toml", "--resume"]);
         let resumed = resumed.with_code(2);
         assert!(

@@ -27,6 +27,8 @@ use machine::{Observer as _, Stage, StopRequest};
 /// How long an answer is held back: Ctrl-C is looked for so often.
 const WAIT: Duration = Duration::from_millis(200);
 
+/// What the service calls three axes that are run together.
+const VOLUME: &str = "volume";
 /// What stops everything, and is taken from anybody.
 const STOP: &str = "/v1/stop";
 /// How runs and motions end, or wait for somebody to go on with them.
@@ -59,9 +61,10 @@ impl Service {
     pub(crate) fn reference(&self, machine: &MachineArgs, output: Output) -> Ended {
         refuse(machine.record.is_some(), "--record")?;
         let stop = stop_request()?;
-        self.zero_first(None, &stop, output)?;
+        self.zero_first(Some(VOLUME), &stop, output)?;
         let waiting = Waiting::of_nobody(&stop, output);
-        let run = self.run(Stage::Reference, json!({}), None, waiting)?;
+        let request = json!({"axis": VOLUME});
+        let run = self.run(Stage::Reference, request, None, waiting)?;
         tell(&run, output)
     }
 
@@ -72,6 +75,13 @@ impl Service {
         output: Output,
     ) -> Ended {
         refuse(!args.readings.is_empty(), "--readings")?;
+        if args.resume.is_some() {
+            // The run goes on as it was asked for.
+            refuse(args.no_activate, "--no-activate with --resume")?;
+            refuse(args.verify, "--verify with --resume")?;
+            refuse(args.accept_drift, "--accept-drift with --resume")?;
+            refuse(args.warm_up_min.is_some(), "--warm-up-min with --resume")?;
+        }
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({
             "axis": args.axis.axis,
@@ -179,8 +189,16 @@ impl Service {
             Some(journal) => (self.paused(&request, journal)?, "resume"),
         };
         let path = format!("/v1/runs/{}", plain(run["id"].as_str().unwrap_or_default()));
-        let mut person = waiting.person(&run["plan"])?;
-        self.begin(&format!("{path}/{verb}"), &json!({}))?;
+        let begun = waiting.person(&run["plan"]).and_then(|person| {
+            self.begin(&format!("{path}/{verb}"), &json!({}))?;
+            Ok(person)
+        });
+        let mut person = begun.inspect_err(|_| {
+            if resume.is_none() {
+                // Nobody else starts what was planned here.
+                let _ = ask(&self.at, "POST", &format!("{path}/abort"), "{}");
+            }
+        })?;
         let mut bars = Bars::new(waiting.output.is_json());
         let begun = Instant::now();
         let ending = match run["can_resume"] == true {

@@ -5,7 +5,7 @@ use std::path::Path;
 use machine::Stage;
 use serde_json::{Value, json};
 
-use super::{Service, Waiting, refuse, stop_request, tell};
+use super::{Service, VOLUME, Waiting, refuse, stop_request, tell};
 use crate::Failure;
 use crate::program::MachineArgs;
 use crate::program::exchange::{ask, plain};
@@ -57,7 +57,7 @@ impl Service {
     pub(crate) fn follow(&self, args: &MachineArgs, request: Value, output: Output) -> Ended {
         refuse(args.record.is_some(), "--record")?;
         let stop = stop_request()?;
-        self.zero_first(None, &stop, output)?;
+        self.zero_first(Some(VOLUME), &stop, output)?;
         let waiting = Waiting::of_nobody(&stop, output);
         let run = self.run(Stage::Job, request, None, waiting)?;
         tell(&run, output)
