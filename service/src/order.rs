@@ -93,7 +93,11 @@ impl Order {
 /// What a run goes along, judged before it is planned.
 #[derive(Clone, Debug)]
 pub(crate) enum Judged {
-    Path(JudgedPath),
+    Path {
+        path: JudgedPath,
+        /// The group that follows it.
+        group: String,
+    },
     Job {
         job: JudgedJob,
         /// It goes on with this journal.

@@ -237,10 +237,11 @@ pub struct RunRequest {
     /// Calibrate: save although the same place measured at the beginning and at the end differs too much.
     #[serde(default)]
     pub accept_drift: bool,
-    /// Calibrate: store what is found, and use what was used before.
+    /// Calibrate: store what is found, and use what was used before. Not together with `verify`.
     #[serde(default)]
     pub aside: bool,
-    /// Calibrate: verify with it at once; where it makes things worse, what was used before is used again.
+    /// Calibrate: verify with it at once; where it makes things worse, what was used before is used again. What failed
+    /// of the verification is in `out_of_tolerance`, beside what was stored.
     #[serde(default)]
     pub verify: bool,
     /// Verify: without the calibration, the stage as found. Path: by the encoders alone.

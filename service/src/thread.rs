@@ -384,14 +384,22 @@ impl Kept {
             Err(_) if self.machine.stop_request().is_requested() => {}
             Ok(found) => {
                 self.load_courses();
-                self.keeper.borrow_mut().run_done(id, found);
+                let is_ending = self.machine.stop_request().is_requested();
+                let is_stopped = found.bad.as_ref().is_some_and(Failure::is_stop);
+                let mut keeper = self.keeper.borrow_mut();
+                match is_stopped && !is_ending {
+                    true => keeper.run_cut_short(&mut self.machine, id, found),
+                    false => keeper.run_done(id, found),
+                }
             }
-            Err(failure) if is_stop(&failure) => {
+            Err(failure) if failure.is_stop() => {
+                // What it found may be stored, and in use.
+                self.load_courses();
                 self.leave(&task, before);
                 let mut keeper = self.keeper.borrow_mut();
                 keeper.run_interrupted(&mut self.machine, id);
             }
-            Err(failure) if stops_the_machine(&failure) => self.failed(failure),
+            Err(failure) if failure.stops_the_machine() => self.failed(failure),
             Err(failure) => {
                 // A verification that finds a calibration harmful takes it out of use.
                 self.load_courses();
@@ -461,22 +469,4 @@ fn in_use(store: &Store, id: Option<&str>) -> Option<CalibrationInUse> {
         id,
         created: created.unwrap_or_default(),
     })
-}
-
-/// Whether it is what ends a procedure that was asked to end.
-fn is_stop(failure: &Failure) -> bool {
-    match failure {
-        Failure::Machine(machine::Failure::Interrupted) => true,
-        Failure::Resumable { source, .. } => is_stop(source),
-        _ => false,
-    }
-}
-
-/// Whether an axis may still move after it, or nobody supervises it: a device, a bus, or what is not known.
-fn stops_the_machine(failure: &Failure) -> bool {
-    match failure.exit_code() {
-        // A refusal, a configuration, a result: the axis stands, and is supervised.
-        2 | 3 | 5 => false,
-        _ => true,
-    }
 }

@@ -1,5 +1,6 @@
 //! The contract of a motion, line by line, on every interface.
 
+mod aside;
 mod calibrations;
 mod jobs;
 mod jogs;

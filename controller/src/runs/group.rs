@@ -118,6 +118,7 @@ impl Group {
     /// # Errors
     /// When `task` has one.
     pub fn refuse(&self, task: &Task) -> Result<(), Failure> {
+        task.refuse_of_calibrations()?;
         (self.runs.refuse)(task)
     }
 
@@ -160,9 +161,9 @@ impl Group {
             };
             match (self.runs.perform)(work, &self.name, &then) {
                 Ok(verified) => found.verified(verified),
-                // It has come to its end at rest: what was stored is told, and why it is not used.
-                Err(failure) if failure.is_of_result() => found.bad = Some(failure),
-                Err(failure) => return Err(failure),
+                Err(failure) if failure.stops_the_machine() => return Err(failure),
+                // What was stored is told, and why it is not verified, or not used.
+                Err(failure) => found.bad = Some(failure),
             }
         }
         if let (Some(told), Some(teller)) = (&mut found.told, teller) {

@@ -69,6 +69,31 @@ impl Task {
         }
     }
 
+    /// # Errors
+    /// When it keeps aside or verifies what it does not find, or verifies with what it keeps aside.
+    pub(super) fn refuse_of_calibrations(&self) -> Result<(), Failure> {
+        let refused = |what: &str, help: &str| {
+            Err(Failure::Usage {
+                what: what.into(),
+                help: help.into(),
+            })
+        };
+        let is_calibration = self.stage == Stage::Calibrate;
+        match (self.aside, self.verify) {
+            (true, true) => refused(
+                "what is kept aside is not verified: it is not used",
+                "leave `aside` or `verify` out",
+            ),
+            (true, false) if !is_calibration => {
+                refused("`aside` is for calibrations", "leave it out")
+            }
+            (false, true) if !is_calibration => {
+                refused("`verify` is for calibrations", "leave it out")
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The verification of what it has made; `None` where none is wanted.
     pub(super) fn then(&self) -> Option<Self> {
         let is_verified = self.verify && !self.aside && self.stage == Stage::Calibrate;

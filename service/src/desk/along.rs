@@ -4,7 +4,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use truestage::Failure;
-use truestage::runs::{AskedJob, JobJudge, JudgedPath, PathJudge};
+use truestage::runs::{AskedJob, JobJudge, PathJudge};
 
 use super::Desk;
 use crate::order::Judged;
@@ -33,15 +33,13 @@ impl Desk {
     pub(crate) fn judge_run(&self, request: &RunRequest) -> Result<Option<Judged>, Problem> {
         refuse_what_is_of_others(request)?;
         match request.kind {
-            RunKind::Path | RunKind::FirstPart => {
-                self.judge_path(request).map(Judged::Path).map(Some)
-            }
+            RunKind::Path | RunKind::FirstPart => self.judge_path(request).map(Some),
             RunKind::Job => self.judge_job(request).map(Some),
             RunKind::Zero | RunKind::Calibrate | RunKind::Verify | RunKind::Reference => Ok(None),
         }
     }
 
-    fn judge_path(&self, request: &RunRequest) -> Result<JudgedPath, Problem> {
+    fn judge_path(&self, request: &RunRequest) -> Result<Judged, Problem> {
         let rows = request.path.as_ref().ok_or_else(|| {
             let what = "a run of a path without `path`";
             let help = "give its rows: \"time_s,x_mm,y_mm,z_mm\\n0,10,10,10\\n1,20,10,10\"";
@@ -59,13 +57,16 @@ impl Desk {
         require_short(&rows)?;
         let mut judges = self.shared.judges.paths.iter();
         let named = |name: &str| request.axis.as_deref().is_none_or(|it| it == name);
-        let (_, judge) = judges.find(|it| named(&it.0)).ok_or_else(|| {
+        let (group, judge) = judges.find(|it| named(&it.0)).ok_or_else(|| {
             let what = "nothing of that follows paths";
             Problem::new(Code::NotOffered, what, "three axes of a volume do")
         })?;
         let judge = judge.lock().unwrap_or_else(PoisonError::into_inner);
         let judged = judge.judge(&self.shared.store, &rows, !request.uncompensated);
-        judged.map_err(refused)
+        Ok(Judged::Path {
+            path: judged.map_err(refused)?,
+            group: group.clone(),
+        })
     }
 
     fn judge_job(&self, request: &RunRequest) -> Result<Judged, Problem> {
@@ -103,17 +104,29 @@ impl Desk {
 fn refuse_what_is_of_others(request: &RunRequest) -> Result<(), Problem> {
     let is_path = matches!(request.kind, RunKind::Path | RunKind::FirstPart);
     let is_job = request.kind == RunKind::Job;
+    let is_calibration = request.kind == RunKind::Calibrate;
     let given = [
         ("path", "path", request.path.is_some() && !is_path),
         ("job", "job", request.job.is_some() && !is_job),
         ("beyond", "job", request.beyond && !is_job),
         ("resume", "job", request.resume.is_some() && !is_job),
+        ("aside", "calibrate", request.aside && !is_calibration),
+        ("verify", "calibrate", request.verify && !is_calibration),
     ];
     let Some((option, kind, _)) = given.into_iter().find(|it| it.2) else {
-        return Ok(());
+        return refuse_both(request);
     };
     let what = format!("`{option}` is for runs of the kind `{kind}`");
     Err(Problem::new(Code::Refused, what, "leave it out"))
+}
+
+/// What is not used is not verified.
+fn refuse_both(request: &RunRequest) -> Result<(), Problem> {
+    if !(request.aside && request.verify) {
+        return Ok(());
+    }
+    let what = "`aside` together with `verify`: what is kept aside is not verified";
+    Err(Problem::new(Code::Refused, what, "leave one of them out"))
 }
 
 /// What is wrong with what was sent is not wrong with the configuration.

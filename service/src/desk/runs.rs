@@ -28,7 +28,8 @@ impl Desk {
         let axis = match &judged {
             // It says itself which one does it.
             Some(Judged::Job { job, .. }) => Some(job.axis.clone()),
-            Some(Judged::Path(_)) | None => request.axis.clone(),
+            Some(Judged::Path { group, .. }) => Some(group.clone()),
+            None => request.axis.clone(),
         };
         let request = RunRequest {
             axis,

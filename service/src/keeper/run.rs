@@ -54,12 +54,12 @@ impl Task {
             warm_up_min: self.request.warm_up_min,
             first_part: self.request.kind == RunKind::FirstPart,
             path: match &self.judged {
-                Some(Judged::Path(path)) => Some(path.clone()),
+                Some(Judged::Path { path, .. }) => Some(path.clone()),
                 Some(Judged::Job { .. }) | None => None,
             },
             job: match &self.judged {
                 Some(Judged::Job { job, .. }) => Some(job.clone()),
-                Some(Judged::Path(_)) | None => None,
+                Some(Judged::Path { .. }) | None => None,
             },
         }
     }
@@ -102,10 +102,17 @@ impl Run {
     }
 }
 
+/// What it gave.
+fn show_found(view: &mut RunView, found: Found) {
+    view.result = found.figures;
+    view.told = found.told.map(ToldView::from);
+    view.out_of_tolerance = found.bad.as_ref().map(cause_of);
+}
+
 /// What is done along it.
 fn plan_along(judged: &Judged) -> RunPlanView {
     match judged {
-        Judged::Path(path) => RunPlanView::of_path(path),
+        Judged::Path { path, .. } => RunPlanView::of_path(path),
         Judged::Job { job, .. } => shown(job.planned.clone()),
     }
 }
@@ -184,6 +191,10 @@ impl Keeper {
     ) -> Result<(), Problem> {
         let at = self.group_of(request.axis.as_deref())?;
         let plan = self.plan_of(request.kind, request.warm_up_min, at)?;
+        if request.verify {
+            // What cannot be verified is refused before anything is measured.
+            self.plan_of(RunKind::Verify, None, at)?;
+        }
         let plan = judged.as_ref().map_or(plan, plan_along);
         self.runs.require_room_for(judged.as_ref())?;
         let grouped = &self.groups[at];
@@ -195,7 +206,7 @@ impl Keeper {
             group,
             resume: match &judged {
                 Some(Judged::Job { resume, .. }) => resume.clone(),
-                Some(Judged::Path(_)) | None => None,
+                Some(Judged::Path { .. }) | None => None,
             },
             judged,
         };
@@ -379,15 +390,27 @@ impl Keeper {
         self.slow_down_run(machine);
     }
 
+    /// The run `id` has its result, and was stopped or paused while that was verified: it ends as stopped when its axes
+    /// stand, since nothing of it is left to go on with.
+    pub(crate) fn run_cut_short(&mut self, machine: &mut Machine, id: &str, found: Found) {
+        if let Ok(run) = self.runs.find(id) {
+            let by = match run.is_pausing {
+                true => "whoever paused it",
+                false => "whoever was asked",
+            };
+            run.stopped.get_or_insert_with(|| stopped_by(by));
+        }
+        self.change_run(id, |view| show_found(view, found));
+        self.slow_down_run(machine);
+    }
+
     /// The run `id` has its result.
     pub(crate) fn run_done(&mut self, id: &str, found: Found) {
         self.free_axes_of(id);
         self.change_run(id, |view| {
             view.state = RunState::Done;
             view.steps_done = view.steps;
-            view.result = found.figures;
-            view.told = found.told.map(ToldView::from);
-            view.out_of_tolerance = found.bad.as_ref().map(cause_of);
+            show_found(view, found);
         });
     }
 

@@ -2,7 +2,7 @@
 
 use truestage::Failure;
 
-use super::{Kept, is_stop, stops_the_machine};
+use super::Kept;
 use crate::keeper::cause_of;
 
 impl Kept {
@@ -31,10 +31,10 @@ impl Kept {
             // The next tick ends the service.
             return;
         }
-        if is_stop(&failure) {
+        if failure.is_stop() {
             let mut keeper = self.keeper.borrow_mut();
             keeper.motion_interrupted(&mut self.machine, id);
-        } else if sent == Sent::Perhaps && stops_the_machine(&failure) {
+        } else if sent == Sent::Perhaps && failure.stops_the_machine() {
             self.failed(failure);
         } else {
             let cause = cause_of(&failure);
