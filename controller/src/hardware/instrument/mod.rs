@@ -5,7 +5,7 @@ pub(crate) mod nd287;
 mod off;
 pub(crate) mod umd2;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "program"))]
 pub(crate) use certificate::tests::comparator;
 
 use core::time::Duration;
