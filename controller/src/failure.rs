@@ -439,24 +439,6 @@ pub(crate) fn in_use_text(in_use: Option<&str>) -> String {
 }
 
 impl Failure {
-    /// Whether it is what ends a procedure that was asked to end.
-    pub fn is_stop(&self) -> bool {
-        match self {
-            Self::Machine(machine::Failure::Interrupted) => true,
-            Self::Resumable { source, .. } => source.is_stop(),
-            _ => false,
-        }
-    }
-
-    /// Whether an axis may still move after it, or nobody supervises it: a device, a bus, or what is not known.
-    pub fn stops_the_machine(&self) -> bool {
-        match self.exit_code() {
-            // A refusal, a configuration, a result: the axis stands, and is supervised.
-            2 | 3 | 5 => false,
-            _ => !self.is_stop(),
-        }
-    }
-
     /// That nothing corrects `axis`.
     pub(crate) fn not_calibrated(axis: &str) -> Self {
         Self::NotCalibrated {

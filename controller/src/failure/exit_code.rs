@@ -4,6 +4,24 @@ use super::Failure;
 use crate::store::StoreError;
 
 impl Failure {
+    /// Whether it is what ends a procedure that was asked to end.
+    pub fn is_stop(&self) -> bool {
+        match self {
+            Self::Machine(machine::Failure::Interrupted) => true,
+            Self::Resumable { source, .. } => source.is_stop(),
+            _ => false,
+        }
+    }
+
+    /// Whether an axis may still move after it, or nobody supervises it: a device, a bus, or what is not known.
+    pub fn stops_the_machine(&self) -> bool {
+        match self.exit_code() {
+            // A refusal, a configuration, a result: the axis stands, and is supervised.
+            2 | 3 | 5 => false,
+            _ => !self.is_stop(),
+        }
+    }
+
     /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus,
     /// 5 the result is out of tolerance, 128 and the signal's number (130 for Ctrl-C, 143 for
     /// SIGTERM) when it was stopped on request.
