@@ -1,4 +1,4 @@
-//! stdout for results, stderr for everything else.
+//! stdout for results, stderr for everything else, in the order in which it was said.
 
 use std::io::Write;
 
@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::ConfigError;
+use crate::program::progress;
 use crate::runs::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
@@ -61,12 +62,14 @@ impl Output {
         } else {
             text.to_owned()
         };
+        progress::settle();
         // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
         let _ = writeln!(std::io::stdout().lock(), "{line}");
     }
 
     /// What happens meanwhile, for people; on stderr so that stdout stays one object.
     pub(crate) fn note(self, text: &str) {
+        progress::settle();
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 

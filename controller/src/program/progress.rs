@@ -12,6 +12,7 @@ use units::Time;
 
 use account::Sign;
 use lines::Lines;
+pub(in crate::program) use lines::settle;
 
 /// What is shown of the procedure that runs.
 pub(crate) struct Bars(Shown);
