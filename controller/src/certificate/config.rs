@@ -40,3 +40,27 @@ pub struct CertificateConfig {
 const fn a_month() -> u32 {
     30
 }
+
+#[cfg(test)]
+impl CertificateConfig {
+    /// One that was read, and certifies `figures`.
+    pub(crate) fn of(figures: super::table::Figures) -> Self {
+        let certified = Certified {
+            identifier: "K".into(),
+            laboratory: "L".into(),
+            serial_number: "S".into(),
+            calibrated: jiff::civil::date(2026, 1, 1),
+            valid_until: jiff::civil::date(2027, 1, 1),
+            hash: "ab".into(),
+            figures,
+        };
+        Self {
+            file: "certificate.xml".into(),
+            serial_number: certified.serial_number.clone(),
+            result: None,
+            valid_months: None,
+            remind_days: a_month(),
+            certified: Some(Arc::new(certified)),
+        }
+    }
+}

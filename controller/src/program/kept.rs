@@ -445,6 +445,7 @@ fn tell(ended: &Value, output: Output) -> Ended {
     let (text, value) = words_of(ended);
     output.result(&text, &value)
 }
+
 /// What a run gave, and why that is a bad result, if it is.
 fn told_of(run: &Value, output: Output) -> Ended {
     let Some(exit_code) = exit_code_of(&run["out_of_tolerance"]) else {

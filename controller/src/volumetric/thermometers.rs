@@ -427,29 +427,15 @@ mod tests {
             correction: -0.2,
             u: 0.01,
         };
-        let certified = Certified {
-            identifier: "K".into(),
-            laboratory: "L".into(),
-            serial_number: "T".into(),
-            calibrated: jiff::civil::date(2026, 1, 1),
-            valid_until: jiff::civil::date(2027, 1, 1),
-            hash: "ab".into(),
-            figures: Figures::Table(vec![point]),
-        };
-        assert_eq!(right(Celsius(20.0), Some(&certified)), Celsius(19.8));
+        let certificate = CertificateConfig::of(Figures::Table(vec![point]));
+        let certified = certificate.certified.as_deref();
+        assert_eq!(right(Celsius(20.0), certified), Celsius(19.8));
         assert_eq!(right(Celsius(20.0), None), Celsius(20.0));
         // Both that of the certificate and that of the key count, wherever it is asked for.
         let (_, own) = shipped();
         let mut thermometer = own.temperature[0].clone();
         thermometer.standard_uncertainty_k = 0.01;
-        thermometer.certificate = Some(CertificateConfig {
-            file: "t.xml".into(),
-            serial_number: "T".into(),
-            result: None,
-            valid_months: None,
-            remind_days: 30,
-            certified: Some(Arc::new(certified)),
-        });
+        thermometer.certificate = Some(certificate);
         let u = thermometer.u_kelvin();
         assert!((u - 0.01 * 2.0_f64.sqrt()).abs() < 1e-12, "{u}");
     }

@@ -1,8 +1,6 @@
-use std::sync::Arc;
-
 use super::*;
 use crate::Edit;
-use crate::certificate::{CertificateConfig, Certified, Figures};
+use crate::certificate::{CertificateConfig, Figures};
 use crate::config::parse;
 use crate::edit::with_spot_cameras;
 use crate::kinds::KINDS;
@@ -156,12 +154,8 @@ fn the_text_of_a_certificate_says_its_result_where_one_is_named() {
         let mut config = parse(VOLUMETRIC, "m").unwrap().config;
         let of = config.volumetric.as_mut().unwrap();
         of.temperature[0].certificate = Some(CertificateConfig {
-            file: "t.xml".into(),
-            serial_number: "T".into(),
             result: result.map(str::to_owned),
-            valid_months: None,
-            remind_days: 30,
-            certified: Some(Arc::new(certified())),
+            ..CertificateConfig::of(Figures::Value { value: 0.0, u: 0.0 })
         });
         version_4::text(&config, "first line\nbody\n").unwrap()
     };
@@ -174,18 +168,6 @@ fn the_text_of_a_certificate_says_its_result_where_one_is_named() {
         text(Some("as left")),
         before + "volumetric.temperature.0.certificate.result = \"as left\"\n"
     );
-}
-
-fn certified() -> Certified {
-    Certified {
-        identifier: "K".into(),
-        laboratory: "L".into(),
-        serial_number: "T".into(),
-        calibrated: jiff::civil::date(2026, 1, 1),
-        valid_until: jiff::civil::date(2027, 1, 1),
-        hash: "ab".into(),
-        figures: Figures::Value { value: 0.0, u: 0.0 },
-    }
 }
 
 #[test]

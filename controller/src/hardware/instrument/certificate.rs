@@ -100,10 +100,8 @@ impl InstrumentConfig {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::certificate::{Certified, Figures, Point};
+    use crate::certificate::{Figures, Point};
     use crate::hardware::instrument::InstrumentDevice;
     use crate::hardware::instrument::nd287::{Nd287CertificatesConfig, Nd287Config};
 
@@ -118,23 +116,7 @@ pub(super) mod tests {
             u: 1e-7,
         };
         let figures = vec![point(-0.01, 1e-6), point(0.0, 1e-6), point(0.01, -4e-6)];
-        let certified = Certified {
-            identifier: "K".into(),
-            laboratory: "L".into(),
-            serial_number: "S".into(),
-            calibrated: jiff::civil::date(2026, 1, 1),
-            valid_until: jiff::civil::date(2027, 1, 1),
-            hash: "ab".into(),
-            figures: Figures::Table(figures),
-        };
-        let scale = CertificateConfig {
-            file: "s.xml".into(),
-            serial_number: "S".into(),
-            result: None,
-            valid_months: None,
-            remind_days: 30,
-            certified: Some(Arc::new(certified)),
-        };
+        let scale = CertificateConfig::of(Figures::Table(figures));
         InstrumentConfig {
             device: InstrumentDevice::Nd287(Nd287Config {
                 poll_period_ms: 100.0,

@@ -107,15 +107,17 @@ mod tests {
         assert_eq!(seen, (expected_s * 1e6) as i64, "{entry}");
     }
 
+    /// The clock of a journal that begins with 2026.
+    fn begun() -> Clock {
+        let mut clock = Clock::default();
+        let header = r#"{"entry":"header","started":"2026-01-01T00:00:00Z"}"#;
+        check(&mut clock, header, 0.0);
+        clock
+    }
+
     #[test]
     fn time_goes_on_with_the_machines_clock_and_begins_again_when_a_run_is_continued() {
-        let mut clock = Clock::default();
-        let it = &mut clock;
-        check(
-            it,
-            r#"{"entry":"header","started":"2026-01-01T00:00:00Z"}"#,
-            0.0,
-        );
+        let it = &mut begun();
         check(it, r#"{"entry":"job"}"#, 0.0);
         check(it, r#"{"entry":"point","at_s":45.5}"#, 0.0);
         check(it, r#"{"entry":"point","at_s":46.0}"#, 0.5);
@@ -136,13 +138,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_beyond_all_calendars_is_not_believed() {
-        let mut clock = Clock::default();
-        let it = &mut clock;
-        check(
-            it,
-            r#"{"entry":"header","started":"2026-01-01T00:00:00Z"}"#,
-            0.0,
-        );
+        let it = &mut begun();
         check(it, r#"{"entry":"point","at_s":1.0}"#, 0.0);
         for far in ["1e12", "-1e12", "1e300", "-1e300"] {
             let entry = format!(r#"{{"entry":"point","at_s":{far}}}"#);
