@@ -7,9 +7,10 @@ use std::process::{Command, Stdio};
 
 use nix::pty::openpty;
 use serde_json::Value;
+use tests::certificate::{Certificate, day_from_now};
 use tests::{Edit, GANTRY, LINEAR, ROTARY, Shipped, UVW, VOLUMETRIC};
 
-use crate::programs::{check_says, program, text, truestage};
+use crate::programs::{check_error, check_says, program, text, truestage};
 
 /// A folder with the configuration of a machine, after `change`.
 fn desk(shipped: Shipped, change: impl Fn(&str) -> String) -> tempfile::TempDir {
@@ -250,4 +251,67 @@ fn a_person_is_asked_and_a_script_is_not() {
     assert!(!seen.contains("go on?"), "{seen}");
     assert_eq!(code, Some(4));
     assert_eq!(truestage(folder.path(), &["zero"]).code, Some(4));
+}
+
+/// What has expired is told before a port is opened, let alone anything is zeroed.
+#[test]
+fn nothing_is_moved_for_a_measurement_by_what_has_an_expired_certificate() {
+    let laser = |text: &str, file: &str| {
+        let section = format!(
+            "[instrument.laser.certificate.wavelength]\nfile = {file:?}\nserial_number = \"L\"\n\n[axis.x.zero]"
+        );
+        text.edit("[axis.x.zero]", &section)
+    };
+    let thermometer = |text: &str, file: &str| {
+        let last = "expansion_ppm_per_k = [5.0, 0.0, 0.0]\n";
+        let section = format!(
+            "{last}\n[volumetric.temperature.certificate]\nfile = {file:?}\nserial_number = \"T\"\n"
+        );
+        text.edit_first(last, &section)
+    };
+    let of_laser = Certificate::of_laser("L", 632.991_372, 1e-6);
+    let (readings, errors) = ([10.0, 30.0], [0.1; 2]);
+    let of_thermometer = Certificate::of_sensor("T", "\\degreecelsius", (&readings, &errors), 0.01);
+    let check = |shipped: Shipped, text: &dyn Fn(&str) -> String, verbs: &[&[&str]], key: &str| {
+        let folder = desk(shipped, text);
+        for verb in verbs {
+            let refused = truestage(folder.path(), verb).with_code(2);
+            check_error(&refused, &[key, "it has ended on"]);
+        }
+        assert!(
+            !folder.path().join("machine-data").exists(),
+            "nothing is written"
+        );
+    };
+    let certificates = tempfile::tempdir().expect("a temporary folder can be made");
+    let written = |certificate: Certificate| {
+        let days = (day_from_now(-800), day_from_now(-799));
+        let expired = Certificate {
+            days,
+            ..certificate
+        };
+        let path = expired.written(certificates.path());
+        path.display().to_string()
+    };
+    let (of_laser, of_thermometer) = (written(of_laser), written(of_thermometer));
+    check(
+        LINEAR,
+        &|text| laser(text, &of_laser),
+        &[
+            &["calibrate", "machine.toml"],
+            &["verify", "machine.toml", "--uncompensated"],
+            &["calibrate", "machine.toml", "--dry-run"],
+        ],
+        "instrument.laser.certificate.wavelength",
+    );
+    check(
+        VOLUMETRIC,
+        &|text| thermometer(text, &of_thermometer),
+        &[
+            &["calibrate", "machine.toml"],
+            &["verify", "machine.toml", "--uncompensated"],
+            &["reference", "machine.toml"],
+        ],
+        "volumetric.temperature.0.certificate",
+    );
 }

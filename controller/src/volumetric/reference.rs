@@ -97,6 +97,14 @@ struct Stops {
     roll: Vec<Mean>,
 }
 
+/// Whether the certificates of the thermometers hold today.
+///
+/// # Errors
+/// Of the first that does not.
+pub(crate) fn require_thermometers_certified(config: &MachineConfig) -> Result<(), Failure> {
+    require_certified(config, THERMOMETERS)
+}
+
 /// The name of the errors in use.
 ///
 /// # Errors
@@ -116,7 +124,7 @@ impl WorkVolume<'_> {
     /// than they were measured at by more than is permitted, a detector is in trouble, or anything
     /// stops the machine. What was in use before stays in use then.
     pub fn reference(&mut self, store: &Store) -> Result<VolumetricReferenced, Failure> {
-        require_certified(self.core.config, THERMOMETERS)?;
+        require_thermometers_certified(self.core.config)?;
         let geometry = measured_geometry(store)?;
         let errors = store.load::<GeometryContent>(&geometry)?.content;
         let then = errors.temperatures();

@@ -28,6 +28,7 @@ mod thermometer_share;
 mod volumetric;
 mod volumetric_cameras;
 mod volumetric_cause;
+mod volumetric_certified;
 mod volumetric_cold;
 mod volumetric_day;
 mod volumetric_kept;

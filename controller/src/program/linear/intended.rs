@@ -17,7 +17,7 @@ use crate::program::linear::gantry;
 use crate::program::linear::verbs::require_active;
 use crate::program::session::choose_axis;
 use crate::program::targets::axis_targets;
-use crate::run::missing;
+use crate::run::{missing, require_certified};
 
 /// Words that linear axes have no use for.
 pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
@@ -152,6 +152,9 @@ fn measured(
     }
     require_alone(&loaded.config, &axis)?;
     let of_axis = &loaded.config.axis[&axis];
+    if let Some(plan) = plan_of(of_axis, stage) {
+        require_certified(&loaded.config, &format!("instrument.{}.", plan.instrument))?;
+    }
     let mut steps = vec![zero_of(&axis, of_axis)?];
     steps.push(calibration(loaded, (&axis, &axis), intent)?);
     let (then, is_verified) = match intent {

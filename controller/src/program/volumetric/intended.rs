@@ -10,6 +10,7 @@ use crate::program::intended::{Intent, Step, calibration, nowhere};
 use crate::program::volumetric::verbs::{targets, warm_up_of};
 use crate::program::{CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::volumetric::calibrate::plan::volume_plan;
+use crate::volumetric::calibrate::require_all_certified;
 use crate::volumetric::motion::require_measured;
 use crate::volumetric::{GEOMETRY, VolumeAxisName, VolumetricConfig, VolumetricFailure};
 
@@ -60,6 +61,9 @@ pub(crate) fn intended(
     let Some(volume) = &loaded.config.volumetric else {
         return Ok(Vec::new());
     };
+    if let (Intent::Calibrate(_) | Intent::Verify(_), Some(own)) = (intent, &volume.calibrate) {
+        require_all_certified(&loaded.config, &own.instrument)?;
+    }
     let mut steps = vec![zeroed(volume)];
     if !matches!(intent, Intent::Zero(_)) {
         steps.push(calibration(loaded, (WHOLE, GEOMETRY), intent)?);

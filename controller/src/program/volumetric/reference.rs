@@ -15,7 +15,9 @@ use crate::program::kept::or_by_its_service;
 use crate::program::output::{Ended, Output};
 use crate::program::volumetric::shown::reference_changes;
 use crate::program::volumetric::verbs::with_zeroed_volume;
-use crate::volumetric::reference::{VolumetricReferenced, measured_geometry};
+use crate::volumetric::reference::{
+    VolumetricReferenced, measured_geometry, require_thermometers_certified,
+};
 use crate::volumetric::{BeamReferencesContent, GivenReferences, REFERENCES, given};
 use crate::{Failure, Machine, config};
 
@@ -58,7 +60,9 @@ pub(crate) fn run(args: &ReferenceArgs, output: Output) -> Ended {
 
 fn reference(args: &MachineArgs, output: Output) -> Ended {
     // Before any bus: a machine of another kind would be asked for a calibration of this one's.
-    has_a_volume(&config::load(&args.config)?.config)?;
+    let config = config::load(&args.config)?.config;
+    has_a_volume(&config)?;
+    require_thermometers_certified(&config)?;
     let ready = |_: &mut Machine, store: &Store| measured_geometry(store);
     let run = |machine: &mut Machine, store: &Store, _| machine.volumetric()?.reference(store);
     let (taken, counters) = with_zeroed_volume(args, "reference", Use::Motion, output, ready, run)?;

@@ -43,6 +43,7 @@ pub use evaluate::VolumetricEvaluated;
 pub(crate) use plan::volume_plan;
 pub(crate) use scatter::Scatter;
 
+use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::made_by::made_by;
 use crate::run::{CalibrateOptions, note_failure, require_certified, utc_now};
@@ -51,10 +52,9 @@ use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
 use crate::volumetric::chosen::use_geometry;
-use crate::volumetric::config::THERMOMETERS;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
-use crate::volumetric::reference::References;
+use crate::volumetric::reference::{References, require_thermometers_certified};
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
@@ -204,8 +204,7 @@ impl WorkVolume<'_> {
             let instrument = instrument.clone();
             return Err(VolumetricFailure::NoInstrument { instrument }.into());
         }
-        require_certified(self.core.config, &format!("instrument.{instrument}."))?;
-        require_certified(self.core.config, THERMOMETERS)?;
+        require_all_certified(self.core.config, instrument)?;
         let head = self.this_volume(GEOMETRY)?;
         Ok(JournalHeader {
             schema_version: SCHEMA_VERSION,
@@ -396,6 +395,18 @@ impl WorkVolume<'_> {
 }
 
 /// Has these lines read again when the run is continued.
+/// Whether what reads lines, and the thermometers beside it, have certificates that hold today.
+///
+/// # Errors
+/// Of the first that does not.
+pub(crate) fn require_all_certified(
+    config: &MachineConfig,
+    instrument: &str,
+) -> Result<(), Failure> {
+    require_certified(config, &format!("instrument.{instrument}."))?;
+    require_thermometers_certified(config)
+}
+
 fn void_lines(lines: &[usize], journal: &mut Journal<VolumeLog>) -> Result<(), Failure> {
     for line in lines.iter().copied() {
         journal.write(&VolumeEntry::LineVoid(LineVoidEntry { line }))?;
