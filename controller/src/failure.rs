@@ -16,7 +16,7 @@ use units::{Metres, Radians};
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
-use crate::linear::PatternFinding;
+use crate::linear::{PatternFinding, SamplesLost};
 use crate::store::StoreError;
 
 use of_kind::{KindFailure, OfKind};
@@ -175,6 +175,9 @@ pub enum Failure {
         /// Why.
         source: RefineError,
     },
+    /// Samples of the Hall sensors were lost however often they were passed.
+    #[error(transparent)]
+    SamplesLost(Box<SamplesLost>),
     /// The zero was found, but not well enough.
     #[error(
         "axis {axis}: hall zero found with a standard uncertainty of {:.4} µm, the limit is {:.4} µm; \

@@ -1,5 +1,6 @@
 //! What a monitoring system asks of a machine: how punctual its SYNCs are, how full its buses, how warm it is.
 
+use core::fmt;
 use core::time::Duration;
 
 use drivers::transport::SyncStatistics;
@@ -42,6 +43,76 @@ pub fn bus_figures(machine: &Machine) -> Vec<BusFigures> {
         }
     });
     buses.collect()
+}
+
+/// How much this computer was late for a machine since the machine was made.
+///
+/// # Example
+///
+/// ```
+/// use machine::HostDelays;
+/// use std::time::Duration;
+///
+/// let before = HostDelays { syncs: 3, pauses: Duration::from_millis(20) };
+/// let after = HostDelays { syncs: 123, pauses: Duration::from_millis(620) };
+/// let meanwhile = after.since(before);
+/// assert_eq!(
+///     meanwhile.to_string(),
+///     "the computer was held up: 120 SYNCs were left out, and this program was kept from its buses for 0.600 s"
+/// );
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HostDelays {
+    /// SYNCs of all buses that were left out because they would have come too late; where time is simulated
+    /// nobody counts them.
+    pub syncs: u64,
+    /// For how long, by the machine's clock, the program was kept from its buses; short pauses do not count.
+    pub pauses: Duration,
+}
+
+impl HostDelays {
+    /// What came to it since it was `earlier`.
+    #[must_use]
+    pub fn since(self, earlier: Self) -> Self {
+        Self {
+            syncs: self.syncs.saturating_sub(earlier.syncs),
+            pauses: self.pauses.saturating_sub(earlier.pauses),
+        }
+    }
+
+    /// Whether the computer was never late.
+    pub fn is_none(self) -> bool {
+        self == Self::default()
+    }
+}
+
+impl fmt::Display for HostDelays {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { syncs, pauses } = *self;
+        let kept = pauses.as_secs_f64();
+        match (syncs, pauses.is_zero()) {
+            (0, true) => write!(f, "the computer was not held up"),
+            (0, false) => write!(
+                f,
+                "the computer was held up: this program was kept from its buses for {kept:.3} s"
+            ),
+            (_, true) => write!(f, "the computer was held up: {syncs} SYNCs were left out"),
+            (_, false) => write!(
+                f,
+                "the computer was held up: {syncs} SYNCs were left out, and this program was kept from its \
+                 buses for {kept:.3} s"
+            ),
+        }
+    }
+}
+
+/// How much this computer was late for `machine` until now.
+pub fn host_delays(machine: &Machine) -> HostDelays {
+    let syncs = bus_figures(machine).into_iter().filter_map(|it| it.sync);
+    HostDelays {
+        syncs: syncs.map(|it| it.skipped).sum(),
+        pauses: machine.host_watch.total(),
+    }
 }
 
 /// A thermometer: the name of its device, which of its sensors it is, and what that said last.

@@ -26,6 +26,8 @@ pub(crate) struct HostWatch {
     due: Option<Time>,
     /// The recent pauses, the newest last: end and length, by the machine's clock.
     pauses: VecDeque<(Time, Duration)>,
+    /// All pauses that there ever were, together.
+    total: Duration,
 }
 
 /// How long the program was kept from its buses in the last seconds.
@@ -63,11 +65,17 @@ impl HostWatch {
         if let Some(due) = self.due.take()
             && now.since(due) >= PAUSE_MIN
         {
+            self.total += now.since(due);
             self.pauses.push_back((now, now.since(due)));
             while self.pauses.front().is_some_and(|it| !is_recent(*it, now)) {
                 self.pauses.pop_front();
             }
         }
+    }
+
+    /// The time that was ever lost.
+    pub(crate) fn total(&self) -> Duration {
+        self.total
     }
 
     /// The time that was lost recently, when it is worth a word.
@@ -163,6 +171,11 @@ mod tests {
             assert!(said.contains(part), "{said}");
         }
         assert_eq!(watch.lost(Time(24_000 * MS)), None);
+        assert_eq!(
+            watch.total(),
+            Duration::from_millis(500),
+            "nothing is forgotten"
+        );
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub use devices::Devices;
 pub use driving::Driving;
 pub use engine::{Desk, Engine, EngineFailure};
 pub use failure::{Failure, Layered};
-pub use figures::{BusFigures, Thermometer, bus_figures, temperatures};
+pub use figures::{BusFigures, HostDelays, Thermometer, bus_figures, host_delays, temperatures};
 pub use machine::{Attendant, Machine, attend};
 pub use moving::Moving;
 pub use observer::{Observer, Silent, Stage};

@@ -62,6 +62,7 @@ impl Failure {
             | Self::FringeJump { .. }
             | Self::DatumSlip { .. }
             | Self::InputNotSeen { .. }
+            | Self::SamplesLost(_)
             | Self::Search { .. }
             | Self::Correction { .. }
             | Self::ScanMismatch { .. }

@@ -29,6 +29,7 @@ pub(crate) mod positions;
 pub(crate) mod record;
 pub(crate) mod run_plan;
 mod runs;
+mod samples_lost;
 pub(crate) mod settings;
 mod sound;
 mod stage;
@@ -75,6 +76,7 @@ pub(crate) use kind::KIND;
 pub(crate) use log::LinearEntry;
 pub(crate) use run_plan::RunPlan;
 pub(crate) use runs::RUNS;
+pub(crate) use samples_lost::SamplesLost;
 #[cfg(feature = "program")]
 pub(crate) use sweep::ZeroPlanned;
 pub(crate) use table_correction::table_correction;

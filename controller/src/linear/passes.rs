@@ -1,4 +1,7 @@
 //! Passes over both flanks of the zero: where they begin and end, how fast they are, and what is read on the way.
+//!
+//! A computer that is held up, or a bus that loses frames, takes samples away from a pass. Where that spoils it the
+//! pass is made again, from where it began.
 
 use core::time::Duration;
 
@@ -8,8 +11,9 @@ use units::{Approach, Metres, MetresPerSecond};
 
 use crate::failure::Failure;
 use crate::linear::ZeroConfig;
+use crate::linear::samples_lost::{Loss, PassRead, SamplesLost};
 use crate::linear::stage::LinearStage;
-use machine::Stage;
+use machine::{Stage, host_delays};
 
 /// How often both flanks are passed, half of them in reverse; two in each direction would do.
 const PASSES: u32 = 6;
@@ -24,6 +28,8 @@ const PASS_MARGIN: f64 = 0.1;
 /// converter, and what the scale errs within one of its periods, are the same in each then, and no scatter of
 /// the passes shows them. (A share that no step and no period is a multiple of: the golden section.)
 const STAGGER: f64 = 0.382;
+/// How often a pass is made again that lost its samples.
+const AGAIN_MAX: u32 = 3;
 /// The steps of zeroing that progress counts: up to the search, its passes, and the new origin.
 pub(super) const SEARCHED: u64 = 3;
 pub(super) const STEPS: u64 = SEARCHED + PASSES as u64 + 1;
@@ -42,15 +48,16 @@ impl LinearStage<'_> {
         let apart = Metres(speed.value() * self.sampling(config).as_secs_f64());
         let stagger = |number: u32| apart * (STAGGER * f64::from(number));
         self.pass(config, low, speed)?;
+        let (mut begin, limits) = (low, (settings, outcome));
         (0..PASSES)
             .map(|number| {
-                self.rest(BETWEEN_PASSES)?;
                 // Where one direction ends, the other one begins.
                 let (approach, end) = match number % 2 {
                     0 => (Approach::Forward, high - stagger(number / 2)),
                     _ => (Approach::Reverse, low + stagger(number / 2 + 1)),
                 };
-                let points = self.pass(config, end, speed)?;
+                let points = self.whole_pass(config, limits, (begin, end), speed)?;
+                begin = end;
                 let done = SEARCHED + u64::from(number) + 1;
                 let observer = self.core.observer();
                 observer.progress(Stage::Zero, self.axis, done, STEPS);
@@ -84,13 +91,50 @@ impl LinearStage<'_> {
         }
     }
 
+    /// A pass from `begin`, where the axis is, to `end` that has the samples that the regression needs.
+    fn whole_pass(
+        &mut self,
+        config: &ZeroConfig,
+        (settings, outcome): (&Settings, &Outcome),
+        (begin, end): (Metres, Metres),
+        speed: MetresPerSecond,
+    ) -> Result<Vec<HallPoint>, Failure> {
+        let mut again = 0;
+        loop {
+            self.rest(BETWEEN_PASSES)?;
+            let before = host_delays(self.core.machine);
+            let read = self.pass(config, end, speed)?;
+            let Some(loss) = Loss::of(&read, settings, outcome) else {
+                return Ok(read.points);
+            };
+            let lost = SamplesLost {
+                axis: self.axis.to_owned(),
+                loss,
+                of: read.points.len() as u32 + read.missing,
+                missing: read.missing,
+                delays: host_delays(self.core.machine).since(before),
+                again,
+            };
+            match lost.loss {
+                Loss::Gap if again == AGAIN_MAX => return Ok(read.points),
+                Loss::Unusable(_) if again == AGAIN_MAX => {
+                    return Err(Failure::SamplesLost(Box::new(lost)));
+                }
+                Loss::Gap | Loss::Unusable(_) => {}
+            }
+            self.core.observer().warning(&lost.warning());
+            again += 1;
+            self.pass(config, begin, speed)?;
+        }
+    }
+
     /// Goes to `end`; what was read on the way.
     pub(super) fn pass(
         &mut self,
         config: &ZeroConfig,
         end: Metres,
         speed: MetresPerSecond,
-    ) -> Result<Vec<HallPoint>, Failure> {
+    ) -> Result<PassRead, Failure> {
         let acceleration = self.core.axis_settings(self.axis)?.acceleration;
         let command = AxisCommand::MoveTo {
             target: end,
@@ -98,17 +142,20 @@ impl LinearStage<'_> {
             acceleration,
         };
         let mut pairing = self.pairing(config);
-        let mut points = Vec::new();
+        let mut read = PassRead::every(self.sampling(config));
         self.core.begin(self.axis, command)?;
         loop {
             let deadline = self.core.now() + Duration::from_millis(100);
             self.core.tick(deadline)?;
             let arrived = self.core.outcome(self.axis)?;
             let sample = self.paired_sample(config, &mut pairing)?;
-            points.extend(sample.map(|it| it.point()));
+            if let Some(sample) = sample {
+                read.take(&sample);
+            }
             if let Some(outcome) = arrived {
                 outcome?;
-                return Ok(points);
+                read.comes_to(self.core.now());
+                return Ok(read);
             }
         }
     }

@@ -64,7 +64,7 @@ impl LinearStage<'_> {
         for (end, apart) in passes {
             self.reference(config)?;
             let speed = self.survey_speed(config, apart);
-            let points = self.pass(config, end, speed)?;
+            let points = self.pass(config, end, speed)?.points;
             let found = self.finding(config, settings, &points);
             if found.is_some() {
                 return Ok(found);

@@ -69,7 +69,7 @@ impl LinearStage<'_> {
         for number in 0..PASSES {
             self.rest(BETWEEN_PASSES)?;
             let end = if number % 2 == 0 { high } else { low };
-            points.extend(self.pass(config, end, speed)?);
+            points.extend(self.pass(config, end, speed)?.points);
         }
         HallSeries::new(points).map_err(|source| Failure::Data(Box::new(source)))
     }

@@ -39,5 +39,6 @@ mod volumetric_resume;
 mod volumetric_rolls;
 mod volumetric_scatter;
 mod wrong_position;
+mod zero_interrupted;
 mod zero_plan;
 mod zero_uncertainty;

@@ -115,11 +115,14 @@ impl RefineOptions {
         distance: Metres,
         sampling: Duration,
     ) -> MetresPerSecond {
-        let window = self
-            .half_window
-            .map_or(distance * WINDOW_SHARE, |half| half * 2.0);
         let samples = 2.0 * self.samples_min() as f64;
-        MetresPerSecond(window.value() / (samples * sampling.as_secs_f64()))
+        MetresPerSecond(self.window(distance).value() / (samples * sampling.as_secs_f64()))
+    }
+
+    /// How wide the window around each flank is where the flanks are `distance` apart.
+    pub(in crate::hall_zero) fn window(&self, distance: Metres) -> Metres {
+        self.half_window
+            .map_or(distance * WINDOW_SHARE, |half| half * 2.0)
     }
 }
 

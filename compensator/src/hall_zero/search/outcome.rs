@@ -62,6 +62,12 @@ impl Outcome {
         RefineOptions::for_search(settings).fastest_pass(distance, sampling)
     }
 
+    /// How wide the part of a flank is that gives its place.
+    pub fn window(&self, settings: &Settings) -> Metres {
+        let distance = self.g2.position - self.g1.position;
+        RefineOptions::for_search(settings).window(distance)
+    }
+
     /// `estimate`, if it is where the search stands.
     fn agreed(
         &self,
