@@ -16,6 +16,7 @@ use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::settings::interpolation_of;
 use crate::rotary::subject::{Subject, plate_record};
 use crate::rotary::table::RotaryTable;
+use crate::rotary::unturned::{Unturned, unturned};
 use crate::rotary::{PlateEntry, RotaryContent};
 use crate::run::{CalibrateOptions, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store};
@@ -256,23 +257,43 @@ impl<'a> Calibration<'a> {
     }
 }
 
-/// A plate that was turned otherwise than was asked for shows as soon as two others were read.
+/// A plate that was not turned shows as soon as it was read twice, one that was turned otherwise than was asked for as
+/// soon as two others were read.
 fn doubt(
     axis: &str,
     run: &PlateRun,
     placed: &[Placed],
     journal: &mut PlateJournal,
 ) -> Result<(), Failure> {
+    let axis = axis.to_owned();
+    if let Some(Unturned {
+        offset,
+        like,
+        scatter,
+    }) = unturned(run, placed)
+    {
+        read_again(journal, offset)?;
+        return Err(RotaryFailure::NotTurned {
+            axis,
+            offset,
+            like,
+            scatter,
+        }
+        .into());
+    }
     if placed.len() < JUDGED_MIN {
         return Ok(());
     }
-    let read = series(axis, run.lines, placed)?;
+    let read = series(&axis, run.lines, placed)?;
     let Some(source) = rotary::misplaced(&read, &SolveOptions::default()) else {
         return Ok(());
     };
-    let offset = source.offset as f64;
-    journal.write(PlateEntry::Misplaced { offset })?;
-    journal.flush_to_disk()?;
-    let axis = axis.to_owned();
+    read_again(journal, source.offset as f64)?;
     Err(RotaryFailure::Misplaced { axis, source }.into())
+}
+
+/// The placement at `offset` does not count: a run that is continued asks for it again.
+fn read_again(journal: &mut PlateJournal, offset: f64) -> Result<(), Failure> {
+    journal.write(PlateEntry::Misplaced { offset })?;
+    Ok(journal.flush_to_disk()?)
 }

@@ -5,8 +5,12 @@ use compensator::rotary::{
 };
 use units::Radians;
 
+use crate::failure::advice::rounded_up;
 use crate::failure::in_use_text;
 use crate::failure::of_kind::KindFailure;
+
+/// The configuration takes no greater `slope_limit`.
+const SLOPE_LIMIT_MAX: f64 = 0.5;
 
 /// Why a rotary table did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +66,25 @@ pub enum RotaryFailure {
         axis: String,
         /// Which placement, and what it fits.
         source: Misplaced,
+    },
+    /// The plate was not turned between two placements.
+    #[error(
+        "axis {axis}: the plate was not turned: the placement at offset {offset} reads as the one at offset {like} does, to \
+         {:.3} arcsec at each position of the table, and lies where that lay, so that the errors of the plate would be taken \
+         for the table's. Nothing was stored; turn the plate by {} lines from where it lay at offset {like} (with --yes \
+         something else must turn it), and continue with --resume, which asks for that placement again and keeps the \
+         others",
+        scatter.arcsec(), units::Short(offset - like), offset = units::Short(*offset), like = units::Short(*like)
+    )]
+    NotTurned {
+        /// Which axis.
+        axis: String,
+        /// The placement that was read last.
+        offset: f64,
+        /// The one that it repeats.
+        like: f64,
+        /// By how much both differ at a position of the table.
+        scatter: Radians,
     },
     /// The plate of a verification lies elsewhere.
     #[error(
@@ -140,7 +163,8 @@ pub enum RotaryFailure {
     /// With its calibration the table is worse than without; it is not used any more.
     #[error(
         "axis {axis}: CALIBRATION {calibration} MAKES THE TABLE WORSE: deviation {:.3} arcsec rms \
-         with it, {:.3} without; {cause}, or the encoder was moved since. It was taken out of use; {}",
+         with it, {:.3} without; {cause}, or the plate was turned the other way than was asked for, or the encoder was moved since. \
+         It was taken out of use; {}",
         after.arcsec(), before.arcsec(), in_use_text(in_use.as_deref())
     )]
     MadeWorse {
@@ -230,13 +254,35 @@ pub enum RotaryFailure {
         source: Misplaced,
     },
     /// A rotary table's error cannot be applied.
-    #[error("axis {axis}: {source}")]
+    #[error("axis {axis}: {source}{}", advice(axis, source))]
     Compensation {
         /// Which axis.
         axis: String,
         /// Why.
         source: PeriodicError,
     },
+}
+
+/// Which key would let a refused table pass, and whether that is wise.
+fn advice(axis: &str, refused: &PeriodicError) -> String {
+    let (key, number) = match refused {
+        PeriodicError::TooLarge { seen, .. } => {
+            ("size_limit_arcsec", rounded_up(seen.abs().arcsec()))
+        }
+        PeriodicError::TooSteep { seen, .. } if *seen < SLOPE_LIMIT_MAX => {
+            ("slope_limit", rounded_up(*seen))
+        }
+        PeriodicError::TooSteep { .. }
+        | PeriodicError::NotInvertible { .. }
+        | PeriodicError::Limits { .. }
+        | PeriodicError::TooFewLines { .. }
+        | PeriodicError::Uncertainties { .. }
+        | PeriodicError::NotFinite { .. } => return String::new(),
+    };
+    format!(
+        "; `{key} = {number}` in [rotary.{axis}.compensation] would accept it, which is wise only where an error like that \
+         is expected of this table: of a plate that was read or entered wrongly it is none"
+    )
 }
 
 impl KindFailure for RotaryFailure {
@@ -247,6 +293,7 @@ impl KindFailure for RotaryFailure {
             | Self::MisplacedInData { .. }
             | Self::TooFast { .. } => 2,
             Self::Misplaced { .. }
+            | Self::NotTurned { .. }
             | Self::LiesElsewhere { .. }
             | Self::NotAnAngle { .. }
             | Self::Compensation { .. } => 3,

@@ -48,6 +48,7 @@ pub(crate) mod sweep;
 mod table;
 mod told;
 mod turn;
+mod unturned;
 pub(crate) mod verify;
 mod warnings;
 

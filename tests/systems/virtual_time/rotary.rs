@@ -9,7 +9,7 @@ use machine::records::{StoreError, read_journal};
 use machine::{Observer, Stage};
 use mock_bus::fault::{Fault, FaultConfig};
 use mock_bus::node::cia402_drive::Cia402DriveNode;
-use tests::{Bench, Edit, Hand};
+use tests::{Bench, Edit, Hand, seeds};
 use truestage::CalibrateOptions;
 use truestage::emulated::{Emulated, HallDrift};
 use truestage::for_tests::{RotaryCalibrated, RotaryVerified};
@@ -498,6 +498,63 @@ fn a_detector_that_dies_and_power_that_is_lost_end_the_run_and_it_goes_on_afterw
     let it = calibrate(&mut bench, &mut hand, &resume).unwrap_or_else(|it| panic!("{it}"));
     assert!(residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC);
     assert_eq!(it.solution.design.offsets(), [0, 73, 162, 232]);
+}
+
+/// Nobody turns the plate: one table that has all its errors explains the readings to their noise, and a verification
+/// with the plate where it is agrees with that.
+#[test]
+fn a_plate_that_nobody_turns_is_told_and_its_errors_are_not_taken_for_the_tables() {
+    for seed in 51..=53 {
+        let mut bench = bench(seed);
+        started(&mut bench);
+        let mut idle = Hand::new(|_| {});
+        let refused = calibrate(&mut bench, &mut idle, &CalibrateOptions::default());
+        let failure = refused.expect_err("it was not turned");
+        let of_table = failure.of_kind();
+        let Some(RotaryFailure::NotTurned { offset, like, .. }) = of_table else {
+            panic!("seed {seed}: {failure}");
+        };
+        assert_eq!((*offset, *like, idle.asked.len()), (73.0, 0.0, 2));
+        assert_eq!(failure.exit_code(), 3);
+        // Whoever turns it then keeps what was read before.
+        let resume = check_nothing_stored(&mut bench, 1);
+        started(&mut bench);
+        let mut hand = hand_of(&bench.emulated);
+        let made = calibrate(&mut bench, &mut hand, &resume);
+        let made = made.unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        let asked: Vec<f64> = hand.asked.iter().map(|it| it.offset).collect();
+        assert_eq!(asked, [73.0, 162.0, 232.0]);
+        assert_eq!(made.solution.design.offsets(), [0, 73, 162, 232]);
+        assert!(
+            residual(&mut bench, 360, 0.0) <= LIMIT_ARCSEC,
+            "seed {seed}"
+        );
+    }
+}
+
+/// How many plates that nobody turns are told, and how many that are turned are taken for such.
+#[test]
+#[ignore = "many tables: for whoever wants the rates, over SEEDS=FIRST..LAST"]
+fn plates_that_nobody_turns_are_counted() {
+    let (mut of, mut told, mut sound_refused) = (0, 0, 0);
+    for seed in seeds("1..20") {
+        let calibrated = |idle: bool| {
+            let mut bench = bench(seed);
+            started(&mut bench);
+            let mut hand = match idle {
+                true => Hand::new(|_| {}),
+                false => hand_of(&bench.emulated),
+            };
+            calibrate(&mut bench, &mut hand, &CalibrateOptions::default())
+        };
+        let failure = calibrated(true).expect_err("it was not turned");
+        let named = matches!(failure.of_kind(), Some(RotaryFailure::NotTurned { .. }));
+        of += 1;
+        told += u32::from(named);
+        sound_refused += u32::from(calibrated(false).is_err());
+    }
+    println!("{told} of {of} told, {sound_refused} of {of} that were turned refused");
+    assert_eq!((told, sound_refused), (of, 0));
 }
 
 #[test]
