@@ -8,6 +8,13 @@ pub(crate) fn likely_cause(pairs: &[(f64, f64)]) -> String {
     told(likeness(pairs))
 }
 
+/// The same where what is left can follow from what the calibration says in several ways: by that which it follows most
+/// closely.
+pub(crate) fn likeliest_cause(ways: &[Vec<(f64, f64)>]) -> String {
+    let likenesses = ways.iter().filter_map(|it| likeness(it));
+    told(likenesses.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())))
+}
+
 /// By which factor what is left follows what the calibration says, and how closely (their correlation); `None` where
 /// either has no shape.
 fn likeness(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
@@ -88,5 +95,15 @@ mod tests {
         );
         check(|at| 3.0 * (1.7 * f64::from(at)).cos(), "does not look like");
         assert!(told(None).contains("does not look like"));
+    }
+
+    #[test]
+    fn of_several_ways_the_one_that_is_followed_most_closely_tells() {
+        let way = |says: fn(f64) -> f64| (0..20).map(move |at| (says(curve(at)), curve(at)));
+        let unlike = (0..20).map(|at| ((1.7 * f64::from(at)).cos(), curve(at)));
+        let ways = [unlike.collect(), way(|it| -0.5 * it).collect::<Vec<_>>()];
+        assert!(likeliest_cause(&ways).contains("its SIGN is wrong"));
+        assert!(likeliest_cause(&ways[..1]).contains("does not look like"));
+        assert!(likeliest_cause(&[]).contains("does not look like"));
     }
 }

@@ -221,3 +221,33 @@ fn a_plate_is_read_through_a_microscope_at_each_line_that_the_table_is_driven_to
         assert!(page.contains("by a person, with the table at each line's nominal angle"));
     }
 }
+
+/// Two placements have nothing left over by which a plate that was turned wrongly would show: its verification tells.
+#[test]
+fn a_calibration_that_is_verified_at_once_is_used_if_it_is_good_and_not_if_it_is_worse() {
+    // The second time by a line the wrong way; it is verified where it should lie.
+    const TURNS: &str = "hand_lines = [1.0, 199.5, -200.5, -1.0, 201.5]";
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, ROTARY, |text| text.edit("hand_lines = []", TURNS));
+        bench.configure("machine.toml", |text| {
+            text.edit("placements = 4 ", "offsets = [0, 1] ")
+                .edit("optimise = ", "# ")
+                .edit("amplification_limit = 3.0", "amplification_limit = 100.0")
+                .edit("tolerance_arcsec = 0.3", "tolerance_arcsec = 3.0")
+        });
+        let words = ["calibrate", "--verify", "--yes"];
+        let good = bench.run(&words).with_code(0);
+        assert_eq!(good["verified"]["within_tolerance"], true, "{good}");
+        let bad = bench.run(&words).with_code(5);
+        let told = text(&bad["error"]);
+        let id = text(&good["calibration"]);
+        for word in ["MAKES THE TABLE WORSE", "turned the other way", &id[..12]] {
+            assert!(told.contains(word), "`{word}` is not in: {told}");
+        }
+        let list = bench.run(&["cal", "list"]).with_code(0);
+        let list = list["calibrations"].as_array().expect("a list");
+        let used: Vec<_> = list.iter().filter(|it| it["active"] == true).collect();
+        assert_eq!((list.len(), used.len()), (2, 1), "{list:?}");
+        assert_eq!(used[0]["id"], id);
+    }
+}

@@ -13,7 +13,7 @@
 use std::path::PathBuf;
 
 use compensator::rotary::{self, PeriodicCompensation};
-use compensator::uncertainty::rms;
+use compensator::uncertainty::{mean, rms};
 use core::f64::consts::TAU;
 use units::Radians;
 
@@ -31,7 +31,7 @@ use crate::rotary::table::RotaryTable;
 use crate::rotary::{JudgedEntry, PlateEntry, RotaryVerifyConfig};
 use crate::run::missing;
 use crate::store::{Store, short};
-use crate::worse::likely_cause;
+use crate::worse::likeliest_cause;
 use machine::Stage;
 
 /// How much better another place of the plate must fit.
@@ -313,9 +313,9 @@ fn judge_table(
         true => store.retire(axis)?,
         false => None,
     };
-    let pairs = known.map(|it| pairs(&it.compensation, left));
+    let ways = known.map(|it| ways(it, verified.offset_lines, left));
     Err(RotaryFailure::MadeWorse {
-        cause: likely_cause(&pairs.unwrap_or_default()),
+        cause: likeliest_cause(&ways.unwrap_or_default()),
         in_use: in_use.as_deref().map(short),
         axis: axis.to_owned(),
         calibration: id.as_deref().map(short).unwrap_or_default(),
@@ -325,15 +325,26 @@ fn judge_table(
     .into())
 }
 
-/// Of each line what the calibration says of its place, and what is left there.
-fn pairs(used: &PeriodicCompensation, left: &RotaryFigures) -> Vec<(f64, f64)> {
-    let lines = left.deviations.len() as f64;
-    let numbered = left.deviations.iter().enumerate();
-    let pairs = numbered.filter_map(|(line, left)| {
-        let says = used.deviation(Radians(TAU * line as f64 / lines)).ok()?;
-        Some((says.value(), (*left)?.value()))
-    });
-    pairs.collect()
+/// Of each line of a plate at `offset` what the calibration says of the place where it lies, and what is left there: of
+/// a table that is wrong and a plate that is right, and of both as one calibration found them, which then has also made
+/// the line wrong by the mean of what the table is wrong by where the line lay.
+fn ways(known: &TableInUse, offset: f64, left: &RotaryFigures) -> [Vec<(f64, f64)>; 2] {
+    let lines = left.deviations.len();
+    let says = |line: usize, offset: f64| {
+        let place = Radians(TAU * (line as f64 + offset) / lines as f64);
+        known.compensation.deviation(place).ok().map(Radians::value)
+    };
+    let of_plate = |line: usize| {
+        let offsets = known.content.offsets.iter();
+        let there: Option<Vec<f64>> = offsets.map(|it| says(line, f64::from(*it))).collect();
+        mean(&there?)
+    };
+    let pair = |line: usize| {
+        let (says, left) = (says(line, offset)?, left.deviations[line]?.value());
+        Some([(says, left), (says - of_plate(line)?, left)])
+    };
+    let pairs: Vec<[(f64, f64); 2]> = (0..lines).filter_map(pair).collect();
+    [0, 1].map(|way| pairs.iter().map(|it| it[way]).collect())
 }
 
 /// Whether the calibration was made with the plate that is to be read.
