@@ -3,6 +3,7 @@
 use core::ops::{Deref, DerefMut};
 
 use drivers::device::Environment;
+use machine::records::ThermometersEntry;
 use units::Metres;
 
 use crate::config::{ConfigHash, MachineConfig};
@@ -71,6 +72,27 @@ impl Core<'_> {
     pub(crate) fn environment_of(&self, name: &str) -> Result<Environment, Failure> {
         let seen = self.devices().instrument(name)?.environment();
         Ok(self.config.instrument[name].certified(&seen))
+    }
+
+    /// What the thermometers of the machine's analog modules show now, for a journal; `None` where it has none.
+    pub(crate) fn thermometers(&self) -> Option<ThermometersEntry> {
+        let modules = self.config.analog.iter();
+        let named = modules.flat_map(|(module, it)| {
+            let channels = it.temperature_channels().iter();
+            channels.map(move |channel| format!("{module} {channel}"))
+        });
+        let names: Vec<String> = named.collect();
+        if names.is_empty() {
+            return None;
+        }
+        let mut shown = vec![None; names.len()];
+        self.devices().hear_temperatures(&mut shown);
+        let shown = shown.into_iter();
+        Some(ThermometersEntry {
+            names,
+            temperatures_c: shown.map(|it| Some(it?.celsius?.value())).collect(),
+            at_s: self.now().seconds(),
+        })
     }
 
     /// Tells what sensors of the instrument `name` read that they were not calibrated at, and of `way`, how far the

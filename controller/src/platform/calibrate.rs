@@ -167,6 +167,7 @@ impl AlignmentPlatform<'_> {
         let total = stops as u64 * u64::from(plan.runs);
         let mut all = vec![MeasuredScrew::default(); count];
         let mut done = 0;
+        self.note_thermometers(journal)?;
         for (at, measured) in all.iter_mut().enumerate() {
             for run in 1..=plan.runs {
                 for (stroke, approach) in round(&targets[at], plan) {
@@ -189,6 +190,7 @@ impl AlignmentPlatform<'_> {
                 }
             }
             self.approach_zero()?;
+            self.note_thermometers(journal)?;
         }
         let closure = self.closure(plan)?;
         journal.write(&PlatformEntry::Closed(ClosureEntry {

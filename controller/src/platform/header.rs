@@ -58,6 +58,17 @@ impl AlignmentPlatform<'_> {
         })
     }
 
+    /// Writes down what the machine's thermometers show, where it has some.
+    pub(super) fn note_thermometers(
+        &self,
+        journal: &mut Journal<PlatformLog>,
+    ) -> Result<(), Failure> {
+        if let Some(shown) = self.core.thermometers() {
+            journal.write(&PlatformEntry::Thermometers(shown))?;
+        }
+        Ok(())
+    }
+
     pub(crate) fn camera_record(&self) -> Result<InstrumentRecord, Failure> {
         let name = self.config.camera.clone();
         let identity = self.core.devices().identities().remove(&name);

@@ -4,7 +4,7 @@ use machine::records::sound::{
     ANGLE_RAD, ERROR_M, ERROR_U_M, Judged, LENGTH_M, PLACE_M, SECONDS, Unsound, approach, as_many,
     counted, is, number, numbers, once, optional, unsound,
 };
-use machine::records::{ClosureEntry, JournalHeader, Log};
+use machine::records::{ClosureEntry, JournalHeader, Log, ThermometersEntry};
 use serde::{Deserialize, Serialize};
 
 use crate::platform::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
@@ -21,6 +21,8 @@ pub enum PlatformEntry {
     Pose(PoseEntry),
     /// A run is whole, and its first pose is still seen where it was.
     Closed(ClosureEntry),
+    /// What the machine's thermometers showed.
+    Thermometers(ThermometersEntry),
 }
 
 /// What such a journal holds.
@@ -34,6 +36,8 @@ pub struct PlatformLog {
     pub poses: Vec<PoseEntry>,
     /// How far each whole run had drifted at its end.
     pub closures: Vec<ClosureEntry>,
+    /// What the machine's thermometers showed, where it has some.
+    pub thermometers: Vec<ThermometersEntry>,
 }
 
 impl Log for PlatformLog {
@@ -47,6 +51,7 @@ impl Log for PlatformLog {
             PlatformEntry::Stroke(it) => stroke(self, header, it),
             PlatformEntry::Pose(it) => pose(self, it),
             PlatformEntry::Closed(it) => it.judge(header),
+            PlatformEntry::Thermometers(it) => it.judge(),
         }
     }
 
@@ -56,6 +61,7 @@ impl Log for PlatformLog {
             PlatformEntry::Stroke(it) => self.strokes.push(it),
             PlatformEntry::Pose(it) => self.poses.push(it),
             PlatformEntry::Closed(it) => self.closures.push(it),
+            PlatformEntry::Thermometers(it) => self.thermometers.push(it),
         }
     }
 

@@ -169,6 +169,7 @@ impl AlignmentPlatform<'_> {
     ) -> Result<Vec<PoseChecked>, Failure> {
         let edge = Metres::from_mm(self.config.edge_mm);
         let mut checked = Vec::new();
+        self.note_thermometers(journal)?;
         for (done, target) in (1..).zip(targets) {
             let moved = if compensated {
                 self.move_to(*target)?
@@ -198,6 +199,7 @@ impl AlignmentPlatform<'_> {
                 .observer()
                 .progress(Stage::Verify, "platform", done, total);
         }
+        self.note_thermometers(journal)?;
         journal.complete()?;
         Ok(checked)
     }

@@ -92,8 +92,29 @@ impl RotaryTable<'_> {
 
     fn read_all(&mut self, it: &mut Calibration<'_>, read: &mut Read<'_>) -> Result<(), Failure> {
         while let Some(due) = it.due()? {
-            let placed = read(self, &it.run, &due, &mut it.journal)?;
+            let placed = self.read_due(read, &it.run, &due, &mut it.journal)?;
             it.take(placed);
+        }
+        Ok(())
+    }
+
+    /// A placement that `read` brings about and reads, with what the machine's thermometers show before and behind it.
+    pub(super) fn read_due(
+        &mut self,
+        read: &mut Read<'_>,
+        run: &PlateRun,
+        due: &DuePlacement,
+        journal: &mut PlateJournal,
+    ) -> Result<Placed, Failure> {
+        self.note_thermometers(journal)?;
+        let placed = read(self, run, due, journal)?;
+        self.note_thermometers(journal)?;
+        Ok(placed)
+    }
+
+    fn note_thermometers(&self, journal: &mut PlateJournal) -> Result<(), Failure> {
+        if let Some(shown) = self.core.thermometers() {
+            journal.write(PlateEntry::Thermometers(shown))?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use machine::records::sound::{
     Unsound, approach, as_many, counted, is, limits, number, numbers, once, optional, optionals,
     unsound,
 };
-use machine::records::{JournalHeader, Log};
+use machine::records::{JournalHeader, Log, ThermometersEntry};
 use serde::{Deserialize, Serialize};
 
 use crate::rotary::SightedAt;
@@ -26,6 +26,8 @@ pub enum PlateEntry {
     Placed(PlacementEntry),
     /// What a verification with a plate found.
     Judged(JudgedEntry),
+    /// What the machine's thermometers showed.
+    Thermometers(ThermometersEntry),
     /// A placement turned out to be another one than was asked for: it must be read again.
     Misplaced {
         /// By how many lines the plate was to be turned.
@@ -49,6 +51,8 @@ pub struct PlateLog {
     pub placements: Vec<PlacementEntry>,
     /// What a verification with it found.
     pub judged: Option<JudgedEntry>,
+    /// What the machine's thermometers showed, where it has some.
+    pub thermometers: Vec<ThermometersEntry>,
 }
 
 impl Log for PlateLog {
@@ -63,6 +67,7 @@ impl Log for PlateLog {
             PlateEntry::Sighted(it) => sighted(self, it),
             PlateEntry::Placed(it) => placed(self, it),
             PlateEntry::Judged(it) => judged(self, it),
+            PlateEntry::Thermometers(it) => it.judge(),
             PlateEntry::Misplaced { offset } | PlateEntry::Discarded { offset } => {
                 at_offset(plan_of(self)?, *offset)
             }
@@ -79,6 +84,7 @@ impl Log for PlateLog {
                 self.placements.push(it);
             }
             PlateEntry::Judged(it) => self.judged = Some(it),
+            PlateEntry::Thermometers(it) => self.thermometers.push(it),
             PlateEntry::Misplaced { offset } | PlateEntry::Discarded { offset } => {
                 self.forget(offset);
             }

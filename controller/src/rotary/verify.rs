@@ -159,7 +159,7 @@ impl RotaryTable<'_> {
         let known = self.memory.calibration.clone();
         let mut it = Verification::begin(self.subject(), store, (compensated, known), resume)?;
         let due = it.due();
-        let placed = read(self, &it.run, &due, &mut it.journal);
+        let placed = self.read_due(read, &it.run, &due, &mut it.journal);
         let placed = placed.inspect_err(|failure| it.journal.note(failure))?;
         let verified = it.judge(store, &placed);
         verified.inspect_err(|failure| {

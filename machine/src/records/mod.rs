@@ -39,6 +39,7 @@ mod line;
 mod name;
 pub mod sound;
 mod store;
+mod thermometers;
 
 pub use atomic::write_new_or_replace;
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
@@ -57,6 +58,7 @@ pub use lease::Lease;
 pub use line::{opened, sealed};
 pub use name::short;
 pub use store::{ActivePointer, Store};
+pub use thermometers::ThermometersEntry;
 
 use failure::{io_error, unsound};
 

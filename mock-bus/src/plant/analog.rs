@@ -43,7 +43,11 @@ impl Input {
 
     /// The reading of a sensor at `sensor_v`, within the rails.
     pub(super) fn read(&mut self, sensor_v: f64) -> f64 {
-        let rail_v = self.rail_v;
+        self.read_within(sensor_v, self.rail_v)
+    }
+
+    /// The same of a sensor with rails of its own.
+    pub(super) fn read_within(&mut self, sensor_v: f64, rail_v: f64) -> f64 {
         let seen_v = match self.fault {
             Some(InputFault::Stuck) => return self.last_v,
             Some(InputFault::Rail) => return rail_v,

@@ -58,6 +58,9 @@ use volumetric::{Sighting, Signal, TERMINALS, Volumetric};
 /// Inputs 0 and 1 are the Hall sensors, of a gantry 2 and 3 those of its second side; the others are spare. Of a
 /// rotary table input 0 is the photodiode over its plate. Three axes have their own.
 const ANALOG_INPUTS: usize = 8;
+/// Where thermometers are wired to, of the air and of the stage, on machines but those of three axes.
+const AIR_TERMINAL: usize = 6;
+const STAGE_TERMINAL: usize = 7;
 /// What a resistance thermometer's input can show.
 const TEMPERATURE_RAIL_C: f64 = 850.0;
 
@@ -187,13 +190,24 @@ impl Plant {
         };
         let input = self.inputs.get_mut(channel)?;
         let open = input.fault == Some(InputFault::Open);
-        (!open).then(|| Celsius(input.read(celsius)))
+        (!open).then(|| Celsius(input.read_within(celsius, TEMPERATURE_RAIL_C)))
     }
 
     /// What is wired to analog input `channel`.
     fn signal(&mut self, channel: usize) -> Option<Signal> {
         if let Some(volumetric) = self.machine.of_mut::<Volumetric>() {
             return volumetric.signal(channel, self.now);
+        }
+        match channel {
+            AIR_TERMINAL => {
+                let air_c = self.climate.at(self.now).air_temperature.value();
+                return Some(Signal::Temperature(air_c));
+            }
+            STAGE_TERMINAL => {
+                let stage_c = self.climate.stage_temperature(self.now).value();
+                return Some(Signal::Temperature(stage_c));
+            }
+            _ => {}
         }
         if let Some(table) = self.machine.of::<Table>() {
             return (channel == 0).then(|| Signal::Voltage(table.line_volts(self.now)));

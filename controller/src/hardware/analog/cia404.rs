@@ -33,7 +33,8 @@ pub struct Cia404Config {
     /// Where it is.
     #[serde(flatten)]
     pub node: NodeConfig,
-    /// Inputs with a resistance thermometer Pt100, read in hundredths of degrees.
+    /// Inputs with a resistance thermometer Pt100, read in hundredths of degrees. Runs of rotary tables and
+    /// platforms write down what they show.
     #[schemars(inner(range(min = 0, max = 7)), extend("x-range" = "none of `channels`"))]
     #[serde(default)]
     pub temperature_channels: Vec<u8>,

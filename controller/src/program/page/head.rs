@@ -6,7 +6,7 @@
 
 use core::fmt::Write as _;
 
-use machine::records::{IdentityRecord, InstrumentRecord, ReadJournal};
+use machine::records::{IdentityRecord, InstrumentRecord, ReadJournal, ThermometersEntry};
 
 use super::escape;
 
@@ -82,6 +82,39 @@ pub(crate) struct Stated {
     pub(crate) sign: &'static str,
     /// Calibrations that were made from the run: their kinds and names.
     pub(crate) made: Vec<(String, String)>,
+}
+
+/// The mean of what was `seen` of `name`, and from where to where it was; `None` where nothing was.
+pub(crate) fn spread(name: &str, unit: &str, digits: usize, seen: &[f64]) -> Option<String> {
+    let mean = compensator::uncertainty::mean(seen)?;
+    let low = seen.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = seen.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Some(format!(
+        "{name} {mean:.digits$} {unit} ({low:.digits$} to {high:.digits$})"
+    ))
+}
+
+/// How warm the machine was by its thermometers, each by its name; `None` where it has none, or none said anything.
+pub(crate) fn warmth(entries: &[ThermometersEntry]) -> Option<String> {
+    let names = &entries.first()?.names;
+    let of = |name: &String| {
+        let seen = entries.iter().filter_map(|it| {
+            let at = it.names.iter().position(|own| own == name)?;
+            it.temperatures_c.get(at).copied().flatten()
+        });
+        spread(name, "°C", 3, &seen.collect::<Vec<f64>>())
+    };
+    let told: Vec<String> = names.iter().filter_map(of).collect();
+    (!told.is_empty()).then(|| format!("thermometers of the machine: {}", told.join(", ")))
+}
+
+/// That nothing was corrected for the temperature, where readings know no such correction.
+pub(crate) fn not_for_temperature() -> Made {
+    Made {
+        name: "temperature".into(),
+        is_made: false,
+        is_missed: false,
+    }
 }
 
 /// The head of the page of `journal`.

@@ -9,7 +9,7 @@ use crate::linear::measure::largest_closure;
 use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::{CriterionEntry, LinearContent, LinearLog, PointEntry, UncertaintyAtTarget};
 use crate::program::linear::uncertainty;
-use crate::program::page::head::{Fact, Made, Stated, facts_of};
+use crate::program::page::head::{Fact, Made, Stated, facts_of, spread};
 use crate::program::text;
 
 /// The head of the page of `journal`; `made` are the calibrations made from it.
@@ -74,12 +74,7 @@ fn environment(points: &[PointEntry]) -> Option<String> {
             .iter()
             .filter_map(|it| value(&it.environment))
             .collect();
-        let mean = compensator::uncertainty::mean(&seen)?;
-        let low = seen.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = seen.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Some(format!(
-            "{name} {mean:.digits$} {unit} ({low:.digits$} to {high:.digits$})"
-        ))
+        spread(name, unit, *digits, &seen)
     };
     let told: Vec<_> = QUANTITIES.iter().filter_map(of).collect();
     (!told.is_empty()).then(|| told.join(", "))

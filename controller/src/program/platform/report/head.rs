@@ -5,7 +5,9 @@ use units::{Metres, Radians};
 
 use super::{Named, Visit};
 use crate::platform::{PlatformLog, PoseRecord};
-use crate::program::page::head::{Fact, IN_USE, Made, Stated, facts_of};
+use crate::program::page::head::{
+    Fact, IN_USE, Made, Stated, facts_of, not_for_temperature, warmth,
+};
 use crate::program::text::verdict;
 use crate::store::budget::PlacesBudgetRecord;
 
@@ -14,15 +16,8 @@ pub(crate) fn head(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -
     let log = &journal.log;
     let measured = log.poses.iter().any(|it| it.target.is_some());
     let stated = Stated {
-        environment: None,
-        corrections: match measured {
-            true => vec![Made {
-                name: "models of the screws".into(),
-                is_made: journal.header.calibration.is_some(),
-                is_missed: false,
-            }],
-            false => Vec::new(),
-        },
+        environment: warmth(&log.thermometers),
+        corrections: corrections(journal, measured),
         uncertainty: uncertainty(calibrations).or_else(|| seen(journal)),
         verdict: judged(journal),
         conformity: Some((
@@ -39,6 +34,19 @@ pub(crate) fn head(journal: &ReadJournal<PlatformLog>, calibrations: &[Named]) -
     let count = log.strokes.len() + log.poses.len();
     facts.push(Fact::new("points", count.to_string()));
     facts
+}
+
+fn corrections(journal: &ReadJournal<PlatformLog>, measured: bool) -> Vec<Made> {
+    let models = Made {
+        name: "models of the screws".into(),
+        is_made: journal.header.calibration.is_some(),
+        is_missed: false,
+    };
+    let mut corrections: Vec<Made> = measured.then_some(models).into_iter().collect();
+    if measured || !journal.log.strokes.is_empty() {
+        corrections.push(not_for_temperature());
+    }
+    corrections
 }
 
 /// The calibrations' names as short as elsewhere.

@@ -3,7 +3,7 @@
 use machine::records::{CalibrationRecord, ReadJournal};
 use units::Radians;
 
-use crate::program::page::head::{Fact, Made, Stated, facts_of};
+use crate::program::page::head::{Fact, Made, Stated, facts_of, not_for_temperature, warmth};
 use crate::program::text::verdict;
 use crate::rotary::PlateLog;
 use crate::rotary::verify::RotaryFigures;
@@ -17,7 +17,7 @@ pub(crate) fn head(
     let log = &journal.log;
     let made = calibrations.first().map(|(_, it)| &it.content);
     let stated = Stated {
-        environment: None,
+        environment: warmth(&log.thermometers),
         corrections: corrections(journal),
         uncertainty: uncertainty(made, log.judged.as_ref()),
         verdict: log.judged.as_ref().and_then(judged),
@@ -44,13 +44,15 @@ fn corrections(journal: &ReadJournal<PlateLog>) -> Vec<Made> {
         is_made,
         is_missed: false,
     };
-    match &journal.log.judged {
+    let mut corrections = match &journal.log.judged {
         Some(judged) => vec![
             made("table error", judged.left_rad.is_some()),
             made("errors of the plate", judged.plate_known),
         ],
         None => Vec::new(),
-    }
+    };
+    corrections.push(not_for_temperature());
+    corrections
 }
 
 fn uncertainty(made: Option<&RotaryContent>, judged: Option<&JudgedEntry>) -> Option<String> {
@@ -96,4 +98,43 @@ fn plate(plan: &PlatePlanEntry) -> [Fact; 3] {
         Fact::new("placements", format!("at {} lines", offsets.join(", "))),
         Fact::new("read", read),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use machine::records::{ThermometersEntry, read_journal};
+
+    use super::*;
+
+    #[track_caller]
+    fn check(journal: &ReadJournal<PlateLog>, name: &str, expected: &str) {
+        let facts = head(journal, &[]);
+        let seen = facts.iter().find(|it| it.name == name);
+        assert_eq!(seen.map(|it| &*it.value), Some(expected));
+    }
+
+    #[test]
+    fn how_warm_it_was_is_said_by_thermometer_and_that_nobody_recorded_it_where_nobody_did() {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/rotary_verify.jsonl");
+        let mut journal = read_journal::<PlateLog>(Path::new(golden)).unwrap();
+        check(&journal, "environment", "not recorded");
+        check(&journal, "corrections off", "temperature");
+        let names = vec![
+            "heat 1".to_owned(),
+            "heat 2".to_owned(),
+            "heat 3".to_owned(),
+        ];
+        journal.log.thermometers = [20.80, 20.90]
+            .map(|celsius| ThermometersEntry {
+                names: names.clone(),
+                temperatures_c: vec![Some(celsius), Some(21.0), None],
+                at_s: 1.0,
+            })
+            .to_vec();
+        let expected = "thermometers of the machine: heat 1 20.850 °C (20.800 to 20.900), heat 2 21.000 °C \
+                        (21.000 to 21.000)";
+        check(&journal, "environment", expected);
+    }
 }
