@@ -23,11 +23,28 @@ def numbers(node, path):
     return [float(it) for text in texts(node, path) for it in text.split()]
 
 
+def single(root):
+    """Quantities that stand by themselves, by the names of their result and their own: value, unit and standard
+    uncertainty."""
+    found = {}
+    for result in root.iter(DCC + "result"):
+        own = found.setdefault(texts(result, DCC + "name")[0], {})
+        for quantity in result.iter(DCC + "quantity"):
+            for real in quantity.iterfind(SI + "real"):
+                u = numbers(real, ".//" + SI + "valueStandardMU")
+                own[texts(quantity, DCC + "name")[0]] = {
+                    "value": numbers(real, SI + "value")[0],
+                    "unit": texts(real, SI + "unit")[0],
+                    "u": u[0] if u else None,
+                }
+    return {name: own for name, own in found.items() if own}
+
+
 def said(root):
     results = []
     for result in root.iter(DCC + "result"):
         quantities = list(result.iter(DCC + "quantity"))
-        if len(quantities) < 2:
+        if result.find(".//" + DCC + "list") is None:
             continue
         results.append(
             {
@@ -38,7 +55,12 @@ def said(root):
                 "uncertainties": numbers(quantities[1], ".//" + SI + "valueStandardMUXMLList"),
             }
         )
-    return {"results": results, "statements": texts(root, ".//" + DCC + "statement")}
+    return {
+        "results": results,
+        "single": single(root),
+        "statements": texts(root, ".//" + DCC + "statement"),
+        "items": texts(root, ".//" + DCC + "identification/" + DCC + "value"),
+    }
 
 
 def judged(schema, path):

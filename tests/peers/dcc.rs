@@ -2,6 +2,7 @@
 //! in it.
 
 mod instruments;
+mod machines;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,13 @@
-//! A Digital Calibration Certificate (DCC) of a linear or a rotary axis.
+//! A Digital Calibration Certificate (DCC) of a linear or a rotary axis, of a platform's screw, or of three axes.
 //!
 //! Source: Physikalisch-Technische Bundesanstalt, DCC schema 3.3.0 (`https://ptb.de/dcc`), and D-SI 2.2.1
 //! (`https://ptb.de/si`) for values with units and standard uncertainties.
 //!
 //! It says what the record says, and that nobody has accredited whoever issues it. Who that is, the record does not
 //! know: it is asked for. The certificates of what measured are named. Absent: a signature; what these certificates say.
+
+mod screw;
+mod volume;
 
 use core::f64::consts::TAU;
 
@@ -27,9 +30,16 @@ pub(super) struct Issuer<'a> {
 }
 
 /// What it certifies.
+#[derive(Default)]
 pub(super) struct Certifiable {
     title: String,
     results: String,
+    /// Conditions that the head of a record does not have.
+    conditions: String,
+    /// The drives' serial numbers, where there are several.
+    drives: Vec<u32>,
+    /// What else its reader must know.
+    remarks: Vec<String>,
 }
 
 impl Certifiable {
@@ -44,6 +54,7 @@ impl Certifiable {
         Ok(Self {
             title: format!("Positioning deviations of axis {axis}"),
             results: sides.iter().map(|it| result(content, *it)).collect(),
+            ..Self::default()
         })
     }
 
@@ -68,6 +79,7 @@ impl Certifiable {
                 "both directions, at the lines of a plate, mean zero",
                 &columns.concat(),
             ),
+            ..Self::default()
         })
     }
 }
@@ -91,7 +103,7 @@ pub(super) fn written(
     let laboratory = given("--laboratory", issuer.laboratory)?;
     let person = given("--person", issuer.person)?;
     let country = country(given("--country", issuer.country)?)?;
-    let Certifiable { title, results } = certified;
+    let Certifiable { title, results, .. } = certified;
     let contact = format!(
         "{}<dcc:location><dcc:countryCode>{country}</dcc:countryCode></dcc:location>",
         name(laboratory)
@@ -106,11 +118,11 @@ pub(super) fn written(
          </dcc:measurementResult>\n</dcc:measurementResults>\n</dcc:digitalCalibrationCertificate>\n",
         software(),
         core(id, head, country),
-        item(head),
+        item(head, &certified.drives),
         name(person),
-        statement(head),
+        statement(head, &certified.remarks),
         equipment(head),
-        conditions(head),
+        conditions(head, &certified.conditions),
         name(title),
     );
     Ok(Written {
@@ -187,7 +199,7 @@ fn core(id: &str, head: &RecordHead, country: &str) -> String {
     )
 }
 
-fn item(head: &RecordHead) -> String {
+fn item(head: &RecordHead, drives: &[u32]) -> String {
     let identification = |value: &str, what: &str| {
         let value = if value.is_empty() { "unknown" } else { value };
         format!(
@@ -196,19 +208,23 @@ fn item(head: &RecordHead) -> String {
             name(what)
         )
     };
+    let drive = |serial: &u32| {
+        let what = "serial number of the drive, 0 where unknown";
+        identification(&serial.to_string(), what)
+    };
+    let drives: String = match drives {
+        [] => drive(&head.drive.serial),
+        several => several.iter().map(drive).collect(),
+    };
     format!(
-        "<dcc:items><dcc:item>{}<dcc:identifications>{}{}{}</dcc:identifications></dcc:item></dcc:items>\n",
+        "<dcc:items><dcc:item>{}<dcc:identifications>{}{drives}{}</dcc:identifications></dcc:item></dcc:items>\n",
         name(&format!("Axis {} of machine {}", head.axis, head.machine)),
         identification(&head.stage_serial, "serial number of the stage"),
-        identification(
-            &head.drive.serial.to_string(),
-            "serial number of the drive, 0 where unknown"
-        ),
         identification(&head.config_hash, "hash of the configuration")
     )
 }
 
-fn statement(head: &RecordHead) -> String {
+fn statement(head: &RecordHead, remarks: &[String]) -> String {
     let certificates = match head.instrument.certificates.as_slice() {
         [] => "The certificates of the instruments are not part of it.",
         _ => {
@@ -216,12 +232,13 @@ fn statement(head: &RecordHead) -> String {
              none."
         }
     };
+    let remarks: String = remarks.iter().map(|it| format!(" {it}")).collect();
     format!(
         "<dcc:statements><dcc:statement>{}<dcc:declaration>{}</dcc:declaration></dcc:statement></dcc:statements>\n",
         name("In-house calibration, not accredited"),
         content(&format!(
             "This certificate was made by a program from a stored calibration. No accreditation body has assessed who \
-             issues it. It is not signed. {certificates}"
+             issues it. It is not signed. {certificates}{remarks}"
         ))
     )
 }
@@ -263,7 +280,7 @@ fn equipment(head: &RecordHead) -> String {
     )
 }
 
-fn conditions(head: &RecordHead) -> String {
+fn conditions(head: &RecordHead, others: &str) -> String {
     let environment = &head.environment;
     let known = [
         (
@@ -281,16 +298,24 @@ fn conditions(head: &RecordHead) -> String {
     ];
     let each = known.iter().filter_map(|(what, value, unit)| {
         let value = (*value)?;
-        Some(format!(
-            "<dcc:influenceCondition>{}<dcc:data><dcc:quantity><si:real><si:value>{value}</si:value>\
-             <si:unit>{unit}</si:unit></si:real></dcc:quantity></dcc:data></dcc:influenceCondition>",
-            name(&format!("{what}, mean over the run"))
+        Some(condition(
+            &format!("{what}, mean over the run"),
+            value,
+            unit,
         ))
     });
-    match each.collect::<String>() {
+    match each.collect::<String>() + others {
         none if none.is_empty() => none,
         each => format!("<dcc:influenceConditions>{each}</dcc:influenceConditions>\n"),
     }
+}
+
+fn condition(what: &str, value: f64, unit: &str) -> String {
+    format!(
+        "<dcc:influenceCondition>{}<dcc:data><dcc:quantity><si:real><si:value>{value}</si:value>\
+         <si:unit>{unit}</si:unit></si:real></dcc:quantity></dcc:data></dcc:influenceCondition>",
+        name(what)
+    )
 }
 
 fn uncertainty(node: &NodeRecord, side: Approach) -> Option<f64> {
@@ -331,6 +356,28 @@ fn listed(title: &str, columns: &str) -> String {
     format!(
         "<dcc:result>{}<dcc:data><dcc:list>\n{columns}</dcc:list></dcc:data></dcc:result>\n",
         name(title)
+    )
+}
+
+/// A result of quantities that each stand by themselves.
+fn quantities(title: &str, each: &str) -> String {
+    format!(
+        "<dcc:result>{}<dcc:data>\n{each}</dcc:data></dcc:result>\n",
+        name(title)
+    )
+}
+
+/// One value, with its standard uncertainty where it has one.
+fn real(what: &str, unit: &str, value: f64, u: Option<f64>) -> String {
+    let u = u.map_or_else(String::new, |u| {
+        format!(
+            "<si:measurementUncertaintyUnivariate><si:standardMU><si:valueStandardMU>{u}</si:valueStandardMU>\
+             </si:standardMU></si:measurementUncertaintyUnivariate>"
+        )
+    });
+    format!(
+        "<dcc:quantity>{}<si:real><si:value>{value}</si:value><si:unit>{unit}</si:unit>{u}</si:real></dcc:quantity>\n",
+        name(what)
     )
 }
 

@@ -16,10 +16,12 @@ use super::format::FormatName;
 use super::{csv, dcc, linuxcnc, pmac, sinumerik};
 use crate::config::{self, Loaded};
 use crate::linear::LinearContent;
+use crate::platform::ScrewContent;
 use crate::program::belongs::head_of;
 use crate::program::output::{Ended, Output};
 use crate::rotary::RotaryContent;
 use crate::rotary::settings::periodic_compensation;
+use crate::volumetric::GeometryContent;
 use crate::{Failure, linear};
 
 const EXAMPLES: &str = "Examples:\n  truestage cal export machine.toml 3f2a --format csv --out x.csv\n  \
@@ -198,7 +200,11 @@ fn certificate(args: &ExportArgs, store: &Store, id: &str) -> Result<Written, Fa
         RotaryContent::KIND => {
             Certifiable::rotary(&head.axis, &store.load::<RotaryContent>(id)?.content)
         }
-        kind => return Err(not_of_one_axis(args.format, head, kind)),
+        ScrewContent::KIND => {
+            Certifiable::screw(&head.axis, &store.load::<ScrewContent>(id)?.content)
+        }
+        GeometryContent::KIND => Certifiable::volume(&store.load::<GeometryContent>(id)?.content),
+        kind => return Err(not_certified(kind)),
     }?;
     let issuer = Issuer {
         laboratory: args.laboratory.as_deref(),
@@ -266,6 +272,16 @@ fn of_rotary(
     })?;
     let made = periodic_compensation(own, &head.axis, table)?;
     Ok(Correction::Rotary(Box::new(made)))
+}
+
+/// What detectors read is no property of a machine by itself.
+fn not_certified(kind: &str) -> Failure {
+    Failure::Usage {
+        what: format!(
+            "--format dcc: a record of the kind {kind} says what detectors of this machine read, which certifies nothing"
+        ),
+        help: "export the calibration that it counts from; `cal list` names all, `cal show --json` prints this one".into(),
+    }
 }
 
 fn not_of_one_axis(format: FormatName, head: &RecordHead, kind: &str) -> Failure {

@@ -9,7 +9,8 @@ use crate::Failure;
 pub(super) enum FormatName {
     /// Deviations and uncertainties in columns, for people and programs; `cal import` reads it.
     Csv,
-    /// Digital Calibration Certificate (PTB, schema 3.3.0) of a linear axis: in-house, not accredited, not signed.
+    /// Digital Calibration Certificate (PTB, schema 3.3.0) of a linear or rotary axis, a platform's screw or three axes:
+    /// in-house, not accredited, not signed.
     Dcc,
     /// LinuxCNC: COMP_FILE with COMP_FILE_TYPE = 1.
     Linuxcnc,
