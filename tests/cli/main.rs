@@ -28,6 +28,7 @@ mod serve_kinds;
 mod soak;
 mod table;
 mod tutorial;
+mod unverified;
 mod verbs;
 mod volumetric;
 mod volumetric_live;

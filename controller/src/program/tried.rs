@@ -1,8 +1,9 @@
 //! A calibration that is verified at once: what was stored is told, whatever becomes of its verification.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use machine::records::{Store, short};
+use serde_json::{Value, json};
 
 use super::CalibrateArgs;
 use super::output::{Ended, Output, with_counters};
@@ -13,19 +14,36 @@ use crate::runs::Told;
 /// A verification, and what it fails by.
 pub(crate) type Verified = (Told, Option<Failure>);
 
+/// What a calibration stored, and how that is told.
+pub(crate) struct Made {
+    pub(crate) told: Told,
+    /// Where it is stored.
+    pub(crate) store: Store,
+    /// What `cal rollback` calls all of it.
+    pub(crate) group: String,
+    /// What the store calls each calibration, and its name.
+    pub(crate) stored: Vec<(String, String)>,
+}
+
 /// Prints what was `made`, and how its verification `ended`, if there was one; with what the devices counted.
 pub(crate) fn tried(
-    made: Option<Told>,
+    made: Option<Made>,
     ended: Result<(Option<Verified>, Value), Failure>,
+    args: &CalibrateArgs,
     output: Output,
 ) -> Ended {
-    let Some(mut told) = made else {
+    let Some(made) = made else {
         return ended.and(Ok(None));
     };
     let (verified, counters) = match ended {
         Ok(ended) => ended,
-        Err(failure) => return output.bad_result(&told.text, told.value, failure),
+        Err(failure) if args.verify => {
+            let (told, failure) = made.not_verified(args, failure);
+            return output.bad_result(&told.text, told.value, failure);
+        }
+        Err(failure) => return output.bad_result(&made.told.text, made.told.value, failure),
     };
+    let mut told = made.told;
     let Some((then, bad)) = verified else {
         return output.told(told, counters);
     };
@@ -35,6 +53,118 @@ pub(crate) fn tried(
         Some(failure) => {
             output.bad_result(&told.text, with_counters(told.value, counters), failure)
         }
+    }
+}
+
+/// How a verification that found nothing ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Cut {
+    /// Somebody stopped it; where what it measured is kept.
+    Stopped(Option<PathBuf>),
+    Failed,
+}
+
+impl Made {
+    /// What is told of it when its verification ended by `failure`, which is told less what it says of going on: it is
+    /// not this command that goes on.
+    fn not_verified(self, args: &CalibrateArgs, failure: Failure) -> (Told, Failure) {
+        let (failure, journal) = match failure {
+            Failure::Resumable { source, journal } => (*source, Some(journal)),
+            other => (other, None),
+        };
+        // 128 and the signal's number: somebody asked for it.
+        let is_stopped = failure.exit_code() >= 128;
+        let cut = match is_stopped {
+            true => Cut::Stopped(journal),
+            false => Cut::Failed,
+        };
+        let machine = &args.axis;
+        let told = self.standing(&cut, (&machine.machine.config, machine.axis.as_deref()));
+        (told, failure)
+    }
+
+    /// What is stored, whether it is used, and what to do next.
+    fn standing(self, cut: &Cut, of: (&Path, Option<&str>)) -> Told {
+        let is_used = |(pointer, id): &(String, String)| {
+            let active = self.store.active(pointer).ok();
+            active.and_then(|it| it.current).as_ref() == Some(id)
+        };
+        let used: Vec<bool> = self.stored.iter().map(is_used).collect();
+        let is_in_use = used.iter().all(|it| *it);
+        let next = self.next(cut, is_in_use, of);
+        let mut told = self.told;
+        told.text += match cut {
+            Cut::Stopped(_) => "\nNOT VERIFIED: its verification was stopped",
+            Cut::Failed => "\nNOT VERIFIED: its verification failed",
+        };
+        let mut stored = Vec::new();
+        for ((pointer, id), is_used) in self.stored.iter().zip(used) {
+            let path = self.store.calibration_path(id);
+            let state = if is_used { "in use" } else { "NOT IN USE" };
+            let name = short(id);
+            told.text += &format!(
+                "\n  {pointer}: {name} is {state}, stored in {}",
+                path.display()
+            );
+            stored.push(json!({"of": pointer, "calibration": id, "path": path, "in_use": is_used}));
+        }
+        for (command, what) in &next {
+            told.text += &format!("\n  `{command}` {what}");
+        }
+        let (ended, journal) = match cut {
+            Cut::Stopped(journal) => ("stopped", journal.as_ref()),
+            Cut::Failed => ("failed", None),
+        };
+        let commands: Vec<&String> = next.iter().map(|it| &it.0).collect();
+        // As the kind calls it.
+        let key = match told.value.get("active") {
+            Some(_) => "active",
+            None => "in_use",
+        };
+        told.value[key] = json!(is_in_use);
+        told.value["verification"] = json!({
+            "ended": ended,
+            "journal": journal,
+            "stored": stored,
+            "next": commands,
+        });
+        told
+    }
+
+    /// Commands, and what they do.
+    fn next(
+        &self,
+        cut: &Cut,
+        is_in_use: bool,
+        (config, axis): (&Path, Option<&str>),
+    ) -> Vec<(String, &'static str)> {
+        let config = config.display();
+        let axis = axis.map_or(String::new(), |it| format!(" --axis {it}"));
+        let verify = format!("truestage verify {config}{axis}");
+        if !is_in_use {
+            let activated = self.stored.iter().filter(|it| self.is_chosen(it));
+            let activate = activated.map(|(_, id)| {
+                let command = format!("truestage cal activate {config} {}", short(id));
+                (command, "uses it all the same")
+            });
+            let again = (verify, "then verifies it again");
+            return activate.chain([again]).collect();
+        }
+        let mut next = vec![match cut {
+            Cut::Stopped(Some(_)) => (format!("{verify} --resume"), "goes on with that"),
+            Cut::Stopped(None) | Cut::Failed => (verify, "verifies it"),
+        }];
+        let all = self.stored.iter();
+        if all.clone().all(|it| self.store.earlier(&it.0).is_ok()) {
+            let back = format!("truestage cal rollback {config} --axis {}", self.group);
+            next.push((back, "goes back to what was used before"));
+        }
+        next
+    }
+
+    /// What is activated by itself, and not with what it belongs to.
+    fn is_chosen(&self, stored: &(String, String)) -> bool {
+        stored.0 == self.group || self.stored.iter().all(|it| it.0 != self.group)
     }
 }
 
@@ -62,5 +192,101 @@ impl CalibrateArgs {
             accept_drift: self.accept_drift,
             aside: self.no_activate,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use machine::records::CalibrationRecord;
+
+    use super::*;
+    use crate::linear::LinearContent;
+
+    const GOLDEN: &str = include_str!("../../golden/linear_budget.json");
+
+    /// Two calibrations of one axis, the second of them just made.
+    fn stored() -> (tempfile::TempDir, Store, [String; 2]) {
+        let folder = tempfile::tempdir().unwrap();
+        let store = crate::stores::store_in(folder.path(), "m");
+        let mut record: CalibrationRecord<LinearContent> = serde_json::from_str(GOLDEN).unwrap();
+        let mut save = |created: &str| {
+            record.head.created = created.into();
+            store.save(&record).unwrap()
+        };
+        let ids = ["2026-01-01T00:00:00Z", "2026-01-02T00:00:00Z"].map(&mut save);
+        (folder, store, ids)
+    }
+
+    fn told(store: &Store, ids: &[(&str, &String)], cut: &Cut) -> Told {
+        let made = Made {
+            told: Told {
+                text: "made".into(),
+                value: json!({"in_use": true}),
+            },
+            store: store.clone(),
+            group: "x".into(),
+            stored: ids
+                .iter()
+                .map(|(of, id)| ((*of).to_owned(), (*id).clone()))
+                .collect(),
+        };
+        made.standing(cut, (Path::new("m.toml"), Some("x")))
+    }
+
+    #[test]
+    fn what_is_used_unverified_is_told_with_how_to_verify_it_and_how_to_go_back() {
+        let (_folder, store, [first, second]) = stored();
+        store.activate("x", &second).unwrap();
+        let told_of = |cut: &Cut| told(&store, &[("x", &second)], cut);
+        let it = told_of(&Cut::Stopped(Some("v.jsonl".into())));
+        let name = short(&second);
+        for part in [
+            "made\nNOT VERIFIED: its verification was stopped",
+            &format!("x: {name} is in use, stored in "),
+            "`truestage verify m.toml --axis x --resume` goes on with that",
+        ] {
+            assert!(it.text.contains(part), "{part}: {}", it.text);
+        }
+        assert!(
+            !it.text.contains("rollback"),
+            "nothing was before: {}",
+            it.text
+        );
+        assert_eq!(it.value["in_use"], true);
+        assert_eq!(it.value["verification"]["ended"], "stopped");
+        assert_eq!(
+            it.value["verification"]["stored"][0]["calibration"],
+            json!(second)
+        );
+        store.activate("x", &first).unwrap();
+        store.activate("x", &second).unwrap();
+        let it = told_of(&Cut::Failed);
+        let commands = json!([
+            "truestage verify m.toml --axis x",
+            "truestage cal rollback m.toml --axis x"
+        ]);
+        assert_eq!(it.value["verification"]["next"], commands);
+    }
+
+    #[test]
+    fn what_is_not_used_any_more_is_told_so_with_how_to_use_it_all_the_same() {
+        let (_folder, store, [first, second]) = stored();
+        store.activate("x", &first).unwrap();
+        let it = told(&store, &[("x", &second)], &Cut::Failed);
+        let name = short(&second);
+        assert!(it.text.contains("its verification failed"), "{}", it.text);
+        assert!(
+            it.text.contains(&format!("x: {name} is NOT IN USE")),
+            "{}",
+            it.text
+        );
+        assert_eq!(it.value["in_use"], false);
+        let commands = json!([
+            format!("truestage cal activate m.toml {name}"),
+            "truestage verify m.toml --axis x"
+        ]);
+        assert_eq!(it.value["verification"]["next"], commands);
+        let path = it.value["verification"]["stored"][0]["path"].as_str();
+        assert!(path.is_some_and(|it| Path::new(it).exists()));
     }
 }

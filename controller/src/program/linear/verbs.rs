@@ -15,7 +15,7 @@ use crate::program::output::{Ended, Output, with_counters};
 use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::{Session, choose_axis};
 use crate::program::targets::axis_targets;
-use crate::program::tried::tried;
+use crate::program::tried::{Made, tried};
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::runs::Told;
 use crate::{Agreed, Failure, Machine};
@@ -91,7 +91,12 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         let calibrated = resumable(&store, "calibrate", &axis, resume.as_deref(), || {
             machine.linear(&axis)?.calibrate(&store, &options)
         })?;
-        made = Some(told::calibrated(&calibrated));
+        made = Some(Made {
+            told: told::calibrated(&calibrated),
+            store: store.clone(),
+            group: axis.clone(),
+            stored: vec![(axis.clone(), calibrated.id.clone())],
+        });
         let verified = match args.verify {
             true => {
                 let options = VerifyOptions {
@@ -108,7 +113,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         machine.shut_down()?;
         Ok((verified, to_json::counters(&machine.devices().counters())))
     });
-    tried(made, ended, output)
+    tried(made, ended, args, output)
 }
 
 fn verified_by(

@@ -14,7 +14,7 @@ use crate::program::platform::target::asked;
 use crate::program::platform::uncertainty;
 use crate::program::session::Session;
 use crate::program::text::verdict;
-use crate::program::tried::{tried, used};
+use crate::program::tried::{Made, tried, used};
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
 use crate::runs::Told;
 use crate::{Failure, Machine};
@@ -79,9 +79,15 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let run = |machine: &mut Machine, store: &Store| {
         let options = args.options(None);
         let calibrated = machine.platform()?.calibrate_by(store, &options)?;
-        made = Some(Told {
-            text: calibrated_text(&calibrated),
-            value: calibrated_value(&calibrated),
+        let screws = calibrated.screws.iter();
+        made = Some(Made {
+            told: Told {
+                text: calibrated_text(&calibrated),
+                value: calibrated_value(&calibrated),
+            },
+            store: store.clone(),
+            group: "platform".into(),
+            stored: screws.map(|it| (it.axis.clone(), it.id.clone())).collect(),
         });
         if !args.verify {
             return Ok(None);
@@ -93,7 +99,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         )))
     };
     let ended = with_zeroed_platform(&args.axis.machine, "calibrate", output, run);
-    tried(made, ended, output)
+    tried(made, ended, args, output)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {

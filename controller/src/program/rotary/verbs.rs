@@ -11,7 +11,7 @@ use crate::program::rotary::readings::{self, ReadBy};
 use crate::program::rotary::targets::{named_way, targets, turns_left_out};
 use crate::program::rotary::told::{self, verified, zeroed};
 use crate::program::session::{Session, choose_axis};
-use crate::program::tried::tried;
+use crate::program::tried::{Made, tried};
 use crate::program::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
 use crate::{Agreed, Failure, Machine};
 use machine::records::Store;
@@ -72,7 +72,12 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
                 Reader::Person(person) => table.calibrate_sighted(store, &options, person),
             }
         })?;
-        made = Some(told::calibrated(axis, &calibrated));
+        made = Some(Made {
+            told: told::calibrated(axis, &calibrated),
+            store: store.clone(),
+            group: axis.to_owned(),
+            stored: vec![(axis.to_owned(), calibrated.id.clone())],
+        });
         if !args.verify {
             return Ok(None);
         }
@@ -86,7 +91,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let ended = with_zeroed_table(&args.axis, "calibrate", Use::Measurement, output, run);
     let ended = ended.map(|(_, verified, counters)| (verified, counters));
-    tried(made, ended, output)
+    tried(made, ended, args, output)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {

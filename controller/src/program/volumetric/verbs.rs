@@ -16,7 +16,7 @@ use crate::program::resume::{journal_to_resume, resumable};
 use crate::program::session::Session;
 use crate::program::targets::axis_target;
 use crate::program::text::verdict;
-use crate::program::tried::tried;
+use crate::program::tried::{Made, tried};
 use crate::program::volumetric::moved::moved;
 use crate::program::volumetric::uncertainty;
 use crate::program::{AxisArgs, CalibrateArgs, MachineArgs, MoveArgs, VerifyArgs};
@@ -25,7 +25,7 @@ use crate::store::budget::PlacesBudgetRecord;
 use crate::volumetric::UnknownRecord;
 use crate::volumetric::motion::{NamedPoint, Ready};
 use crate::volumetric::verify::VolumetricVerified;
-use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricCalibrated, WarmUp};
+use crate::volumetric::{GEOMETRY, REFERENCES, VerifyBy, VolumetricCalibrated, WarmUp};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -103,9 +103,17 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
                 .volumetric()?
                 .calibrate_by(store, warm_up, &options, &mut operator)
         })?;
-        made = Some(Told {
-            text: calibrated_text(&calibrated),
-            value: calibrated_value(&calibrated),
+        made = Some(Made {
+            told: Told {
+                text: calibrated_text(&calibrated),
+                value: calibrated_value(&calibrated),
+            },
+            store: store.clone(),
+            group: GEOMETRY.into(),
+            stored: vec![
+                (GEOMETRY.into(), calibrated.id.clone()),
+                (REFERENCES.into(), calibrated.references.clone()),
+            ],
         });
         if !args.verify {
             return Ok(None);
@@ -120,7 +128,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     };
     let (machine, purpose) = (&args.axis.machine, Use::Measurement);
     let ended = with_zeroed_volume(machine, "calibrate", purpose, output, ready, run);
-    tried(made, ended, output)
+    tried(made, ended, args, output)
 }
 
 pub(crate) fn calibrated_text(made: &VolumetricCalibrated) -> String {

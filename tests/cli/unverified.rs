@@ -1,0 +1,88 @@
+//! Calibrations whose verification does not come to its end.
+
+use std::fs;
+
+use nix::sys::signal::Signal;
+use serde_json::{Value, json};
+use tests::{Edit, LINEAR, Shipped, UVW};
+
+use crate::programs::{Bench, live_rigs, text};
+
+/// How often `entry` is in journals of this verb.
+fn entries(bench: &Bench, verb: &str, entry: &str) -> usize {
+    let Ok(runs) = fs::read_dir(bench.records().join("runs")) else {
+        return 0;
+    };
+    let named = runs.filter_map(|it| {
+        let path = it.ok()?.path();
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        name.contains(&format!("-{verb}-")).then_some(path)
+    });
+    let wanted = format!("\"entry\":\"{entry}\"");
+    let texts = named.filter_map(|it| fs::read_to_string(it).ok());
+    texts.map(|it| it.matches(&wanted).count()).sum()
+}
+
+/// What a calibration tells whose verification is stopped when it has written two of `entry`.
+fn stopped(bench: &Bench, entry: &str) -> Value {
+    let mut process = bench.start(&["calibrate", "machine.toml", "--verify"]);
+    process.wait_until(|| entries(bench, "verify", entry) >= 2);
+    process.signal(Signal::SIGINT);
+    let ended = process.end();
+    assert!(ended.said.contains("stopped on request"), "{ended:?}");
+    assert!(
+        !ended.said.contains("the same command with --resume"),
+        "{ended:?}"
+    );
+    ended.with_code(130)
+}
+
+/// What is stored is told with its place, and is in use; what to do next can be done.
+#[track_caller]
+fn check(bench: &Bench, told: &Value, count: usize) {
+    assert_eq!(told["verification"]["ended"], "stopped", "{told:#}");
+    let stored = told["verification"]["stored"].as_array().expect("a list");
+    assert_eq!(stored.len(), count);
+    let list = bench
+        .run_plainly(&["cal", "list", "machine.toml"])
+        .with_code(0);
+    let list = list["calibrations"].as_array().expect("a list").clone();
+    for it in stored {
+        assert!(bench.folder().join(text(&it["path"])).exists(), "{it}");
+        let listed = list.iter().find(|own| own["id"] == it["calibration"]);
+        let listed = listed.unwrap_or_else(|| panic!("{it} is not in {list:?}"));
+        assert_eq!(
+            (&listed["active"], &it["in_use"]),
+            (&json!(true), &json!(true)),
+            "{it}"
+        );
+    }
+    let next = told["verification"]["next"].as_array().expect("a list");
+    let words: Vec<&str> = text(&next[0]).split(' ').skip(1).collect();
+    assert_eq!(words[..2], ["verify", "machine.toml"], "{next:?}");
+    bench.run(&words).with_code(0);
+}
+
+#[track_caller]
+fn checked(shipped: Shipped, entry: &str, count: usize, change: impl Fn(String) -> String) {
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, shipped, |text| text);
+        bench.configure("machine.toml", &change);
+        let told = stopped(&bench, entry);
+        check(&bench, &told, count);
+    }
+}
+
+#[test]
+fn a_linear_calibration_whose_verification_is_stopped_is_told_and_verified_later() {
+    checked(LINEAR, "point", 1, |text| text);
+}
+
+#[test]
+fn the_screws_of_a_platform_whose_verification_is_stopped_are_told_and_verified_later() {
+    checked(UVW, "pose", 3, |text| {
+        text.edit("step_mm = 0.25", "step_mm = 0.625")
+            .edit("runs = 2", "runs = 1")
+            .edit("poses = 20", "poses = 6")
+    });
+}
