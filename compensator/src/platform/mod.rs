@@ -28,6 +28,7 @@ mod datum;
 mod forward;
 mod presets;
 mod reach;
+pub mod worse;
 
 use crate::uncertainty::propagate;
 use units::portable::{cos, hypot, sin};

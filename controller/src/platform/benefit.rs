@@ -6,11 +6,11 @@ use units::{Metres, Radians};
 
 use crate::failure::Failure;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::mistaken::{Judged, Permitted};
 use crate::platform::moves::PoseMoved;
 use crate::platform::state::{difference, largest_error};
 use crate::platform::verify::PlatformVerified;
 use crate::store::{Store, short};
-use crate::worse::likely_cause;
 
 impl AlignmentPlatform<'_> {
     /// The error that the screws' calibrations took away of a move to `target`: they sent the platform so far beside it.
@@ -31,37 +31,39 @@ impl AlignmentPlatform<'_> {
     ) -> Result<(), Failure> {
         let edge = Metres::from_mm(self.config.edge_mm);
         let judged = verified.poses.iter().filter_map(|it| {
-            let (left, known) = (difference(it.seen, it.target), it.known?);
-            Some((left, known))
+            let said = it.known?;
+            Some(Judged {
+                target: it.target,
+                said,
+                was: sum(difference(it.seen, it.target), said),
+            })
         });
-        let judged: Vec<(Pose, Pose)> = judged.collect();
-        let rms = |of: &dyn Fn(&(Pose, Pose)) -> Pose| {
+        let judged: Vec<Judged> = judged.collect();
+        let rms = |of: &dyn Fn(&Judged) -> Pose| {
             let squares = judged.iter().map(|it| {
                 let error = largest_error(of(it), edge).value();
                 error * error
             });
             Metres((squares.sum::<f64>() / judged.len().max(1) as f64).sqrt())
         };
-        let (before, after) = (rms(&|it| sum(it.0, it.1)), rms(&|it| it.0));
+        let (before, after) = (rms(&|it| it.was), rms(&|it| difference(it.was, it.said)));
         if verified.is_within_tolerance() || after <= before {
             return Ok(());
         }
-        let pairs: Vec<(f64, f64)> = judged
-            .iter()
-            .flat_map(|(left, known)| {
-                let each =
-                    |it: &Pose| [it.x.value(), it.y.value(), it.angle.value() * edge.value()];
-                let (known, left) = (each(known), each(left));
-                [0, 1, 2].map(|at| (known[at], left[at]))
-            })
-            .collect();
+        let permitted = Permitted {
+            kinematics: &self.state.kinematics,
+            screws: self.state.screws.iter().map(|it| &*it.axis).collect(),
+            tolerance: verified.tolerance,
+            edge,
+        };
+        let cause = permitted.cause(&judged);
         let (calibration, in_use) = self.fall_back(store)?;
         Err(Failure::MadeWorse {
             axis: "platform".into(),
             calibration,
             before,
             after,
-            cause: likely_cause(&pairs),
+            cause,
             in_use,
         })
     }

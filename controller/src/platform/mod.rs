@@ -22,6 +22,7 @@ mod header;
 mod kind;
 mod log;
 mod look;
+mod mistaken;
 mod motion;
 pub(crate) mod moves;
 pub(crate) mod record;

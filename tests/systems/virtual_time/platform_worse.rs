@@ -63,19 +63,30 @@ fn screws_that_make_it_worse_are_found_out_and_those_before_are_used_again() {
     let made = platform.calibrate(&store).expect("it is made");
     platform.verify(&store, true).expect("a good one stays");
     let good = in_use(&bench);
-    for screw in &made.screws {
-        let mut record = store
-            .load::<ScrewContent>(&screw.id)
-            .expect("it was stored");
+    let screws = made.screws.iter();
+    let all: Vec<_> = screws.map(|it| (it.axis.clone(), it.id.clone())).collect();
+    let told = worse(&mut bench, &all);
+    assert!(told.contains("used before, is in use again"), "{told}");
+    assert!(told.contains("SIGN"), "{told}");
+    assert_eq!(in_use(&bench), good);
+    // W pushes along y, and no other screw does.
+    let w: Vec<_> = all.into_iter().filter(|it| it.0 == "w").collect();
+    let told = worse(&mut bench, &w);
+    assert!(told.contains("left of y is twice"), "{told}");
+}
+
+/// What a verification says once the calibrations of these screws, by axis and name, have the other sign.
+fn worse(bench: &mut Bench, screws: &[(String, String)]) -> String {
+    let store = bench.store.clone();
+    for (axis, id) in screws {
+        let mut record = store.load::<ScrewContent>(id).expect("it was stored");
         record.content = reversed(&record.content);
         let wrong = store.save(&record).expect("there is room");
-        store.activate(&screw.axis, &wrong).expect("there is room");
+        store.activate(axis, &wrong).expect("there is room");
     }
     let mut platform = bench.machine.platform().expect("it is one");
     platform.load_active(&store).expect("they can be used");
     let failure = platform.verify(&store, true).expect_err("it is worse");
     assert!(matches!(failure, Failure::MadeWorse { .. }), "{failure}");
-    let told = failure.to_string();
-    assert!(told.contains("used before, is in use again"), "{told}");
-    assert_eq!(in_use(&bench), good);
+    failure.to_string()
 }
