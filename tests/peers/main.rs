@@ -1,7 +1,8 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
 //! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
 //! lxml, which judges certificates by the schema of the PTB; DuckDB and the library of MCAP, which read exported journals;
-//! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its page.
+//! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its
+//! page and draws pictures of others.
 
 mod analog;
 mod budget;
@@ -14,6 +15,7 @@ mod http;
 mod local_node;
 mod page;
 mod peer;
+mod pictures;
 mod recording;
 
 use tests::Rig;

@@ -7,9 +7,9 @@ use crate::http::programs;
 use crate::peer::{Peer, can_import};
 
 /// As Debian calls it.
-const BROWSER: &str = "chromium";
+pub(crate) const BROWSER: &str = "chromium";
 
-fn has_browser() -> bool {
+pub(crate) fn has_browser() -> bool {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&folders).any(|it| it.join(BROWSER).is_file())
 }

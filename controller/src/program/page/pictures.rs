@@ -1,6 +1,6 @@
 //! The pictures of a page by themselves, for slides and papers.
 
-use super::{COLOURS_LIGHT, escape};
+use super::COLOURS_LIGHT;
 
 /// A picture and what its file is called.
 pub(crate) struct Picture {
@@ -8,7 +8,10 @@ pub(crate) struct Picture {
     pub(crate) svg: String,
 }
 
-/// Every picture of the page `html`, with a size, a ground and colours of its own: dark on light.
+/// Fonts by a name that every program knows.
+const FONT: &str = "sans-serif";
+
+/// Every picture of the page `html`, with a size, a white ground and colours of its own: dark on light.
 pub(crate) fn pictures(html: &str) -> Vec<Picture> {
     let each = html.split("<svg ").skip(1);
     let each = each.filter_map(|it| it.split_once("</svg>"));
@@ -30,10 +33,17 @@ fn picture(number: usize, svg: &str) -> Option<Picture> {
         file: format!("{number:02}-{}.svg", file_name(title)),
         svg: format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {size}\" width=\"{width}\" height=\"{height}\" \
-             font-family=\"{}\"><style>:root{{{COLOURS_LIGHT}}}</style><rect width=\"{width}\" \
-             height=\"{height}\" fill=\"var(--paper)\"/>{drawn}</svg>\n",
-            escape("system-ui, sans-serif")
+             font-family=\"{FONT}\"><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>{}</svg>\n",
+            coloured(drawn)
         ),
+    })
+}
+
+/// With colours in place of their names: programs that are no browsers know no variables, and would draw all of it black.
+fn coloured(drawn: &str) -> String {
+    let colours = COLOURS_LIGHT.split(';').filter_map(|it| it.split_once(':'));
+    colours.fold(drawn.to_owned(), |drawn, (name, colour)| {
+        drawn.replace(&format!("var({name})"), colour)
     })
 }
 
@@ -64,7 +74,13 @@ mod tests {
         let files: Vec<_> = all.iter().map(|it| it.file.as_str()).collect();
         assert_eq!(files, ["01-error-lt-table.svg", "02-drift-2nd-day.svg"]);
         for it in &all {
-            assert!(it.svg.contains("--first:") && it.svg.contains("xmlns"));
+            // Of the page's style sheet nothing is left to be known.
+            assert!(
+                !it.svg.contains("var(") && it.svg.contains("xmlns"),
+                "{}",
+                it.svg
+            );
+            assert!(it.svg.contains("fill=\"#0b66c3\"") && it.svg.contains("fill=\"#fff\""));
             assert_eq!(it.svg.matches("<svg").count(), 1);
             assert_eq!(it.svg.matches("<circle").count(), 2);
         }
