@@ -52,7 +52,8 @@ struct Course {
 impl Course {
     /// Whether the stage, which now is `here`, meets the trouble on its way.
     fn meets(&mut self, here: Metres) -> bool {
-        let before = core::mem::replace(&mut self.before, Some(here)).unwrap_or(here);
+        let before = self.before.unwrap_or(here);
+        self.before = Some(here);
         let crosses = (before < self.place) != (here < self.place);
         let (due, once) = self.due;
         let is_due = match once {
