@@ -388,6 +388,13 @@ pub fn combined(budget: &[Contribution]) -> Metres {
     Metres(combine(&lines))
 }
 
+/// The part of [`combined`] that is the same share of every length corrected by the same sensors and coefficients: one error
+/// of theirs stretches all of them alike.
+pub fn in_common(budget: &[Contribution]) -> Metres {
+    let shares = budget.iter().filter(|it| it.source != Source::DeadPath);
+    combined(&shares.copied().collect::<Vec<_>>())
+}
+
 /// Puts `new` into `length` and returns the change.
 fn replace(length: &mut Metres, new: Metres) -> Metres {
     let change = new - *length;

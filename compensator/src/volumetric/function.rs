@@ -55,6 +55,29 @@ pub enum FunctionError {
     },
 }
 
+/// Where in an interval it is said how far a function may be from its curve: shares of its width.
+pub(crate) const INSIDE: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// What a parabola over the interval has [`INSIDE`] it.
+fn parabola(middle: f64) -> [f64; 3] {
+    INSIDE.map(|t| middle * 4.0 * t * (1.0 - t))
+}
+
+/// At the share `t` of an interval, by the polynomial of the fourth degree through `inside` and the nodes, where there
+/// is nothing: what a cubic spline leaves of a smooth function goes with t²(1 − t)², what straight lines leave with
+/// t(1 − t), and both are such polynomials.
+pub(crate) fn between_at(inside: [f64; 3], t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    let [quarter, half, three] = inside;
+    let ends = t * (1.0 - t);
+    // Lagrange's: each is 1 at its own place and 0 at the four others.
+    let of_quarter = 128.0 / 3.0 * (t - 0.5) * (t - 0.75);
+    let of_half = -64.0 * (t - 0.25) * (t - 0.75);
+    let of_three = 128.0 / 3.0 * (t - 0.25) * (t - 0.5);
+    let all = quarter * of_quarter + half * of_half + three * of_three;
+    (ends * all).max(0.0)
+}
+
 /// Polynomial pieces over increasing nodes, held beyond them. Plain numbers inside.
 #[derive(Clone, Debug)]
 pub(crate) struct Pieces {
@@ -156,8 +179,8 @@ pub struct Function<Q> {
     shape: Shape,
     /// Standard uncertainties over the nodes, as straight lines.
     uncertainty: Option<Pieces>,
-    /// By piece: how far it may be from its curve in the middle, as a standard uncertainty.
-    between: Vec<f64>,
+    /// By piece: how far it may be from its curve at the [`INSIDE`] of it, as standard uncertainties.
+    between: Vec<[f64; 3]>,
     quantity: PhantomData<Q>,
 }
 
@@ -200,29 +223,39 @@ impl<Q: Quantity> Function<Q> {
         Ok(self)
     }
 
-    /// With how far the true function may be from this one in the middle between two nodes, one standard
-    /// uncertainty for each interval: 4t(1 − t) of it at the share t of the interval.
+    /// With how far the true function may be from this one between two nodes, as standard uncertainties: three for each
+    /// interval, at a quarter, a half and three quarters of it, or one, in its middle, and then 4t(1 − t) of it at the
+    /// share t of the interval.
     ///
     /// # Errors
-    /// When there is another number of them than of intervals, or one is negative or not finite.
+    /// When there is another number of them than of intervals or three times that, or one is negative or not finite.
     pub fn with_between(mut self, uncertainties: &[Q]) -> Result<Self, FunctionError> {
         let values: Vec<f64> = uncertainties.iter().map(|it| it.value()).collect();
-        let (seen, nodes) = (values.len(), self.pieces.segments.len());
-        if seen != nodes {
-            return Err(FunctionError::Lengths { seen, nodes });
+        let (seen, intervals) = (values.len(), self.pieces.segments.len());
+        if seen != intervals && seen != INSIDE.len() * intervals {
+            return Err(FunctionError::Lengths {
+                seen,
+                nodes: intervals,
+            });
         }
         let sound = |u: &f64| u.is_finite() && *u >= 0.0;
         if let Some(index) = values.iter().position(|u| !sound(u)) {
             return Err(FunctionError::NotFinite { index });
         }
-        self.between = values;
+        self.between = if seen == intervals {
+            values.iter().map(|middle| parabola(*middle)).collect()
+        } else {
+            let each = values.chunks_exact(INSIDE.len());
+            each.map(|it| core::array::from_fn(|k| it[k])).collect()
+        };
         Ok(self)
     }
 
-    /// What [`with_between`](Self::with_between) said; `None` when it said nothing.
+    /// What [`with_between`](Self::with_between) said, three for each interval; `None` when it said nothing.
     pub fn between(&self) -> Option<Vec<Q>> {
         let known = !self.between.is_empty();
-        known.then(|| self.between.iter().copied().map(Q::from_value).collect())
+        let all = || self.between.iter().flatten().copied();
+        known.then(|| all().map(Q::from_value).collect())
     }
 
     /// Its value at `position`; the end nodes' values beyond them. NaN for NaN.
@@ -253,10 +286,9 @@ impl<Q: Quantity> Function<Q> {
     /// uncertainty; zero where [`with_between`](Self::with_between) said nothing.
     pub fn between_at(&self, position: Metres) -> Q {
         let (inside, at) = self.pieces.finder.find(position.value());
-        let between = self.between.get(at).map_or(0.0, |middle| {
+        let between = self.between.get(at).map_or(0.0, |own| {
             let piece = &self.pieces.segments[at];
-            let t = ((inside - piece.start) / piece.width).clamp(0.0, 1.0);
-            middle * 4.0 * t * (1.0 - t)
+            between_at(*own, (inside - piece.start) / piece.width)
         });
         Q::from_value(between)
     }
@@ -344,6 +376,36 @@ mod tests {
         assert!((f.standard_uncertainty(Metres(0.05)).unwrap().um() - 0.2).abs() < 1e-9);
         let wrong = f.with_uncertainties(&[Metres(-1.0); 4]).unwrap_err();
         assert_eq!(wrong, FunctionError::NotFinite { index: 0 });
+    }
+
+    /// At the first interval, from 0 to 0.1 m.
+    #[track_caller]
+    fn check_between(said: &[f64], expected: impl Fn(f64) -> f64) {
+        let said: Vec<Metres> = said.iter().copied().map(Metres).collect();
+        let f = function(Shape::Spline).with_between(&said).unwrap();
+        for t in [0.0, 0.1, 0.25, 0.4, 0.5, 0.8, 1.0] {
+            let seen = f.between_at(Metres(0.1 * t)).value();
+            assert!((seen - expected(t)).abs() < 1e-18, "{seen} at {t}");
+        }
+        let again = function(Shape::Spline).with_between(&f.between().unwrap());
+        let (seen, before) = (again.unwrap().between(), f.between());
+        assert_eq!(seen, before);
+    }
+
+    /// 1 in the middle is 0.75 at the quarters of a parabola, 0.5625 at those of its square.
+    #[test]
+    fn what_is_between_nodes_has_the_shape_that_was_said() {
+        check_between(&[1e-7; 3], |t| 1e-7 * 4.0 * t * (1.0 - t));
+        let (quarter, half) = (0.5625e-7, 1e-7);
+        let steep = [quarter, half, quarter].repeat(3);
+        check_between(&steep, |t| 1e-7 * (4.0 * t * (1.0 - t)).powi(2));
+        let aside = function(Shape::Spline).with_between(&[Metres(1.0); 4]);
+        let expected = FunctionError::Lengths { seen: 4, nodes: 3 };
+        assert_eq!(aside.unwrap_err(), expected);
+        // Next to a node nothing is below zero, however steep it is.
+        let steeper = [0.1e-7, 1e-7, 0.1e-7].repeat(3).into_iter().map(Metres);
+        let f = function(Shape::Spline).with_between(&steeper.collect::<Vec<_>>());
+        assert_eq!(f.unwrap().between_at(Metres(0.005)), Metres::ZERO);
     }
 
     #[test]

@@ -148,6 +148,10 @@ pub struct LineReadingEntry {
     pub deviation_si: f64,
     /// Its standard uncertainty.
     pub u_si: f64,
+    /// What all lines have in common of that, with the sign that one error of the instrument has here; 0 in files of
+    /// earlier programs.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub common_si: f64,
     /// Standard deviation of the samples averaged, of the path that was counted.
     pub scatter_m: Option<f64>,
     /// What the slides were displaced by beyond the references: across x, y, z, two directions each.
@@ -216,6 +220,7 @@ impl LineReadingEntry {
             read_si,
             deviation_si: read_si,
             u_si,
+            common_si: observation.common,
             ..Self::default()
         }
     }
@@ -241,8 +246,13 @@ impl LineReadingEntry {
             tool: point(self.tool_m),
             run,
             reading,
+            common: self.common_si,
         })
     }
+}
+
+fn is_nothing(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn parts(reading: &Reading) -> (Option<[f64; 3]>, Option<char>, f64, f64) {

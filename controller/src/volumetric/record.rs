@@ -78,8 +78,9 @@ pub struct FunctionRecord {
     pub values_si: Vec<f64>,
     /// Their standard uncertainties, where known.
     pub standard_uncertainties_si: Option<Vec<f64>>,
-    /// For the middle of each interval, the standard uncertainty of how far the error is from the curve
-    /// there; `None` in files of earlier programs, and where that is not known.
+    /// At a quarter, a half and three quarters of each interval, or in the middle of each in files of earlier programs,
+    /// the standard uncertainty of how far the error is from the curve there; `None` where that is not known, and in the
+    /// earliest files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub between_standard_uncertainties_si: Option<Vec<f64>>,
 }

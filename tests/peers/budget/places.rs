@@ -149,6 +149,7 @@ fn reading(run: usize, mm: f64, below_mm: f64, reading: Reading) -> Observation 
         tool: Point::from_mm(0.0, 0.0, -below_mm),
         run,
         reading,
+        common: 0.0,
     }
 }
 

@@ -19,9 +19,10 @@ use std::collections::BTreeMap;
 use compensator::budget::PlacesBudget;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::ErrorName;
+use compensator::volumetric::{Axis, Point};
 use tests::volume::{
     Frame, Off, Volume, beyond, by_short_ways, calm, good, largest, largest_range, percentile_95,
-    random_places, spread,
+    point_mm, random_places, spread,
 };
 use tests::{Bench, Coverage, Edit, VOLUMETRIC, normal, of_each, seeds};
 use truestage::for_tests::VolumetricCalibrated;
@@ -117,6 +118,9 @@ fn day_of_made(fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
 fn day_in(frame: Option<Frame>, fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
     let (mut later, made) = Volume::calibrated(fresh, WARM_UP);
     tell_parts(&later, &made);
+    if let Some(frame) = &frame {
+        tell_calibration(&mut later, &made, frame);
+    }
     eprintln!(
         "seed {seed}: {} lines, {} readings beyond the unknowns, scatter {:.2} of what was stated, u {:.3} um",
         made.lines,
@@ -405,6 +409,11 @@ const THERMOMETERS_K: f64 = 0.003;
 /// Likewise what its beams are off by, micrometres: air, a source that shifts where it is taken to swing, the width of the
 /// spot ([`coverage_of_what_is_seen`] counts it).
 const BEAMS_UM: f64 = 0.09;
+/// Likewise what references of a beam are off by as a straightness, beside their scatter and the spot's width, micrometres:
+/// a source that shifts while they are taken.
+const BEAM_REFERENCES_UM: f64 = 0.02;
+/// Likewise references of a roll, beside their scatter and the volts per millimetre, arcseconds: a converter's step.
+const ROLL_REFERENCES_ARCSEC: f64 = 0.01;
 
 /// A laser whose errors are drawn from what is stated of them (one that repeats with each half wavelength is as good as
 /// chance from reading to reading, and does not average out), and detectors of roll on all three slides, with a tool on
@@ -417,20 +426,33 @@ fn as_stated(seed: u64) -> Volume {
         0.2 * normal(&mut state),
         3.0 * normal(&mut state),
     );
-    with_laser(seed, &laser, 50.0 + normal(&mut state))
+    let detectors = |text: &str| rolls_as_stated(text, seed);
+    read_by(seed, (&laser, 50.0 + normal(&mut state)), &detectors)
 }
 
-/// The same machine with a laser that errs in nothing.
+/// The same machine with instruments that err in nothing but the noise of their channels, without which they would seem
+/// stuck.
 fn read_exactly(seed: u64) -> Volume {
-    with_laser(seed, "noise_nm = 0.0", 50.0)
+    let detectors = |text: &str| {
+        emulated_three_rolls(text)
+            .edit("turbulence_um = 0.1", "turbulence_um = 0.0")
+            .edit("translation_um = 0.2", "translation_um = 0.0")
+            .edit(
+                "radius_tolerance_percent = 1.0",
+                "radius_tolerance_percent = 0.0",
+            )
+    };
+    read_by(seed, ("noise_nm = 0.0", 50.0), &detectors)
 }
 
-fn with_laser(seed: u64, laser: &str, dead_path_mm: f64) -> Volume {
+/// A machine whose lines are read by a laser with a dead path of so many millimetres, and by `detectors`.
+fn read_by(
+    seed: u64,
+    (laser, dead_path_mm): (&str, f64),
+    detectors: &dyn Fn(&str) -> String,
+) -> Volume {
     let laser = format!("[plant.interferometer]\n{laser}\n\n[plant.volumetric.laser]");
-    let emulated = |text: String| {
-        let text = rolls_as_stated(&text, seed);
-        text.edit("[plant.volumetric.laser]", &laser)
-    };
+    let emulated = |text: String| detectors(&text).edit("[plant.volumetric.laser]", &laser);
     let dead_path = format!("dead_path_mm = {dead_path_mm}");
     let machine = |text: String| known_as_drawn(&text).edit("dead_path_mm = 50.0", &dead_path);
     Volume::zeroed(seed, machine, emulated)
@@ -446,10 +468,16 @@ fn rolls_as_stated(text: &str, seed: u64) -> String {
 /// Three rolls, with beams and thermometers that are known as well as the emulated ones repeat.
 fn known_as_drawn(text: &str) -> String {
     let thermometers = format!("standard_uncertainty_k = {THERMOMETERS_K}");
-    let beams = format!("standard_uncertainty_um = {BEAMS_UM}");
+    let beams = format!(
+        "standard_uncertainty_um = {BEAMS_UM}\nreference_standard_uncertainty_um = {BEAM_REFERENCES_UM}"
+    );
+    let rolls = format!(
+        "standard_uncertainty_arcsec = 0.03\nreference_standard_uncertainty_arcsec = {ROLL_REFERENCES_ARCSEC}"
+    );
     calm(three_rolls(text))
         .edit("standard_uncertainty_k = 0.01", &thermometers)
         .edit("standard_uncertainty_um = 0.1", &beams)
+        .edit("standard_uncertainty_arcsec = 0.03", &rolls)
 }
 
 /// How much of the variances stated each contribution is, in the mean.
@@ -466,7 +494,7 @@ fn tell_shares(days: &[(u64, Day)]) {
 
 /// Machines that calibrate themselves and work for eight hours on another day: of what is stated of the tool at
 /// random places, how much is so. What a frame is follows from conventions about errors (none at zero, no slope), and is as
-/// uncertain as these are: all is judged in the frame of the same machine as a perfect laser finds it. `SEEDS=1..200 cargo test -p tests --test systems coverage_of_volumes -- --ignored
+/// uncertain as these are: all is judged in the frame of the same machine as perfect instruments find it. `SEEDS=1..200 cargo test -p tests --test systems coverage_of_volumes -- --ignored
 /// --nocapture`.
 #[test]
 #[ignore = "many machines: for whoever wants the rates, over SEEDS=FIRST..LAST"]
@@ -490,7 +518,12 @@ fn coverage_of_volumes() {
 fn coverage_of_what_is_seen() {
     let days = days_of(seeds("1..200"), &|seed| {
         let machine = |text: String| known_as_drawn(&text);
-        let mut volume = Volume::zeroed(seed, machine, |text| rolls_as_stated(&text, seed));
+        // Films that grow between the moment of the known errors and that of the last reference would be an error of neither.
+        let emulated = |text: String| {
+            let text = rolls_as_stated(&text, seed);
+            text.edit("from_h = 0.0, share = 0.8", "from_h = 0.2, share = 0.8")
+        };
+        let mut volume = Volume::zeroed(seed, machine, emulated);
         volume.know_errors();
         let store = volume.bench.store.clone();
         good(volume.work().reference(&store));
@@ -506,8 +539,8 @@ fn coverage_of_what_is_seen() {
 /// What a tilt acts on, where it is compared with displacements.
 const LEVER_M: f64 = 0.3;
 
-/// By axis, how much of what is stated of its functions between their nodes (variances in the middles of the intervals) they
-/// do there; and what makes the calibration uncertain.
+/// By axis, how much of what is stated of its functions between their nodes (variances at a quarter, a half and three
+/// quarters of the intervals) they do there; and what makes the calibration uncertain.
 fn tell_parts(volume: &Volume, made: &VolumetricCalibrated) {
     let (mut done, mut stated) = ([0.0; 3], [0.0; 3]);
     for it in &made.found.functions {
@@ -521,10 +554,12 @@ fn tell_parts(volume: &Volume, made: &VolumetricCalibrated) {
         };
         let values: Vec<Metres> = it.nodes.iter().map(|at| is_at(*at)).collect();
         let drawn = Function::new(&it.nodes, &values, Shape::Spline).expect("nodes in order");
-        for (pair, u) in it.nodes.windows(2).zip(&it.u_between) {
-            let middle = (pair[0] + pair[1]) / 2.0;
-            done[axis] += (drawn.at(middle) - is_at(middle)).value().powi(2);
-            stated[axis] += (u * lever.unwrap_or(1.0)).powi(2);
+        for (pair, u) in it.nodes.windows(2).zip(it.u_between.chunks(3)) {
+            for (share, u) in [0.25, 0.5, 0.75].into_iter().zip(u) {
+                let at = pair[0] + (pair[1] - pair[0]) * share;
+                done[axis] += (drawn.at(at) - is_at(at)).value().powi(2);
+                stated[axis] += (u * lever.unwrap_or(1.0)).powi(2);
+            }
         }
     }
     for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
@@ -542,4 +577,28 @@ fn tell_parts(volume: &Volume, made: &VolumetricCalibrated) {
         let share = shares.sum::<f64>() / budget.places.len() as f64;
         eprintln!("  calibration: {:5.1} % {}", 100.0 * share, it.name);
     }
+}
+
+/// What the tables alone leave in the morning by what their calibration states of it.
+fn tell_calibration(volume: &mut Volume, made: &VolumetricCalibrated, frame: &Frame) {
+    let store = volume.bench.store.clone();
+    let (state, _) = good(volume.work().state(&store)).expect("it was stored");
+    let everywhere = spread(0, 200);
+    let left = frame.all_seen(&everywhere, &volume.by_tables(&everywhere, &state));
+    let own = volume.bench.loaded.config.volumetric.as_ref();
+    let tool = point_mm(own.expect("a volume").tool_offset_mm);
+    let (mut by_stated, mut squares) = (Vec::new(), [0.0; 3]);
+    for (mm, left) in everywhere.iter().zip(&left) {
+        let u: Point = made
+            .found
+            .standard_uncertainty(point_mm(*mm), tool, &[])
+            .expect("within its nodes");
+        for axis in Axis::ALL {
+            let ratio = left[axis.index()].value() / u.along(axis).value();
+            squares[axis.index()] += ratio * ratio / everywhere.len() as f64;
+            by_stated.push(ratio);
+        }
+    }
+    let count = Coverage::new(by_stated);
+    eprintln!("  calibration by what it states: {count}; x, y, z {squares:.2?}");
 }

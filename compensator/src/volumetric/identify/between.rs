@@ -13,8 +13,8 @@
 //!
 //! | symbol | name here |
 //! |---|---|
-//! | a²·(1 − 2wᵀk + wᵀKw): the mean-square error in the middle of an interval, w the node's weights | [`Between::at_middles`] |
-//! | 4t(1 − t) of it elsewhere | [`share`] |
+//! | a²·(1 − 2wᵀk + wᵀKw): the mean-square error inside an interval, w the node's weights | [`Between::inside`] |
+//! | the polynomial through its roots at three places elsewhere | [`between_at`] |
 //! | how alike the errors in the middles of two intervals are, by k − wᵀk′ − w′ᵀk + wᵀKw′ | [`Between::alike`] |
 //!
 //! Absent: functions of two nodes, of which nothing can be said; what repeats within a step, such as the
@@ -26,7 +26,7 @@ use units::portable::{exp, ln};
 use super::Axis;
 use super::block::{Block, axis_of, kernel};
 use crate::least_squares::Fit;
-use crate::volumetric::function::Shape;
+use crate::volumetric::function::{INSIDE, Shape, between_at};
 
 /// Lengths that are tried, the longest in units of the travel.
 const LENGTHS: usize = 9;
@@ -47,28 +47,24 @@ pub(super) enum Extent {
     AtMost(f64),
 }
 
-/// By block, for the middle of each interval between its nodes, the standard deviation of the function
-/// from its curve, in its SI unit.
+/// By block, inside each interval between its nodes, the standard deviation of the function from its curve,
+/// in its SI unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Between {
-    pub(super) at_middles: Vec<Vec<f64>>,
-    /// By block, the correlations of these.
+    /// At the [`INSIDE`] of each interval.
+    inside: Vec<Vec<[f64; 3]>>,
+    /// By block, the correlations of those in the middles.
     alike: Vec<DMatrix<f64>>,
-}
-
-/// The share of what there is in the middle of an interval, at `t` of it from 0 to 1.
-fn share(t: f64) -> f64 {
-    4.0 * t * (1.0 - t)
 }
 
 impl Between {
     /// By the values of the functions in `fit`; `shape`: how they are drawn.
     pub(super) fn of(blocks: &[Block], fit: &Fit, shape: Shape, extent: Extent) -> Self {
-        let mut at_middles: Vec<Vec<f64>> = blocks
+        let mut inside: Vec<Vec<[f64; 3]>> = blocks
             .iter()
-            .map(|it| vec![0.0; it.nodes.len().saturating_sub(1)])
+            .map(|it| vec![[0.0; 3]; it.nodes.len().saturating_sub(1)])
             .collect();
-        let mut alike: Vec<DMatrix<f64>> = at_middles
+        let mut alike: Vec<DMatrix<f64>> = inside
             .iter()
             .map(|it| DMatrix::identity(it.len(), it.len()))
             .collect();
@@ -80,18 +76,19 @@ impl Between {
                 .into_iter()
                 .filter_map(|at| Some((at, Judged::new(&blocks[at], fit, shape)?)))
                 .collect();
-            for (at, middles, own) in of_axis(&judged, extent) {
-                at_middles[at] = middles;
+            for (at, found, own) in of_axis(&judged, extent) {
+                inside[at] = found;
                 alike[at] = own;
             }
         }
-        Self { at_middles, alike }
+        Self { inside, alike }
     }
 
-    /// For the middles of the intervals of the block of this number.
+    /// At the [`INSIDE`] of each interval of the block of this number.
     pub(super) fn of_block(&self, number: usize, block: &Block) -> Vec<f64> {
-        let none = || vec![0.0; block.nodes.len().saturating_sub(1)];
-        self.at_middles.get(number).cloned().unwrap_or_else(none)
+        let none = || vec![0.0; INSIDE.len() * block.nodes.len().saturating_sub(1)];
+        let own = self.inside.get(number);
+        own.map_or_else(none, |it| it.as_flattened().to_vec())
     }
 
     /// At a position, of the block of this number.
@@ -105,9 +102,8 @@ impl Between {
         let after = nodes.partition_point(|it| *it <= position);
         let at = after.clamp(1, nodes.len() - 1) - 1;
         let t = (position - nodes[at]) / (nodes[at + 1] - nodes[at]);
-        let middles = self.at_middles.get(number);
-        let u = middles.map_or(0.0, |it| it[at] * share(t.clamp(0.0, 1.0)));
-        (at, u)
+        let inside = self.inside.get(number);
+        (at, inside.map_or(0.0, |it| between_at(it[at], t)))
     }
 
     /// Adds to `covariance`, by reading, what all of them share of the block of this number: `read` is where
@@ -136,7 +132,10 @@ impl Between {
 }
 
 /// All lengths, weighted by what all functions of the axis say of them.
-fn of_axis(judged: &[(usize, Judged)], extent: Extent) -> Vec<(usize, Vec<f64>, DMatrix<f64>)> {
+fn of_axis(
+    judged: &[(usize, Judged)],
+    extent: Extent,
+) -> Vec<(usize, Vec<[f64; 3]>, DMatrix<f64>)> {
     let step = judged
         .iter()
         .map(|it| it.1.step)
@@ -153,12 +152,12 @@ fn of_axis(judged: &[(usize, Judged)], extent: Extent) -> Vec<(usize, Vec<f64>, 
         .map(|all| all.iter().map(|it| it.likelihood).sum())
         .collect();
     let weights = normalised(&likelihoods);
-    let middles = |number: usize| {
+    let inside = |number: usize| {
         let intervals = each[0][number].squares.len();
-        let own = |at: usize| {
+        let own = |at: usize, place: usize| {
             let of_length = |(all, weight): (&Vec<ByLength>, &f64)| {
                 let it = &all[number];
-                let square = it.squares[at];
+                let square = it.squares[at][place];
                 let sizes = it.sizes.clone().into_iter();
                 let weight = *weight;
                 sizes.map(move |(size, own)| (size + square, weight * own))
@@ -166,20 +165,20 @@ fn of_axis(judged: &[(usize, Judged)], extent: Extent) -> Vec<(usize, Vec<f64>, 
             each.iter().zip(&weights).flat_map(of_length).collect()
         };
         (0..intervals)
-            .map(|at| exp(0.5 * extent.of(own(at))))
+            .map(|at| core::array::from_fn(|place| exp(0.5 * extent.of(own(at, place)))))
             .collect()
     };
     let alike = |number: usize| {
         let terms = lengths.iter().zip(&weights);
         let first = &judged[number].1;
-        let nothing = DMatrix::zeros(first.middles.len(), first.middles.len());
+        let nothing = DMatrix::zeros(first.inside.len(), first.inside.len());
         terms.fold(nothing, |sum, (length, weight)| {
             sum + first.alike(*length) * *weight
         })
     };
     let numbered = judged.iter().enumerate();
     numbered
-        .map(|(number, (at, _))| (*at, middles(number), alike(number)))
+        .map(|(number, (at, _))| (*at, inside(number), alike(number)))
         .collect()
 }
 
@@ -206,8 +205,8 @@ struct ByLength {
     likelihood: f64,
     /// Of each size the logarithm of its square, and its weight.
     sizes: Vec<(f64, f64)>,
-    /// For each interval the logarithm of the mean-square error in its middle in units of the size's square.
-    squares: Vec<f64>,
+    /// For each interval the logarithm of the mean-square error at its [`INSIDE`] in units of the size's square.
+    squares: Vec<[f64; 3]>,
 }
 
 /// One function, made ready to be compared with random ones.
@@ -219,8 +218,8 @@ struct Judged {
     values: DVector<f64>,
     /// L⁻¹ of their noise's covariance LLᵀ.
     whitening: DMatrix<f64>,
-    /// The middles of the intervals, with each node's weight there.
-    middles: Vec<(f64, DVector<f64>)>,
+    /// By interval its [`INSIDE`], with each node's weight there.
+    inside: Vec<[(f64, DVector<f64>); 3]>,
     step: f64,
     span: f64,
 }
@@ -244,12 +243,14 @@ impl Judged {
         let size = noise.nrows();
         let noise = noise + DMatrix::identity(size, size) * jitter;
         let whitening = noise.cholesky()?.l().try_inverse()?;
-        let middles = nodes.windows(2).map(|it| {
-            let middle = f64::midpoint(it[0], it[1]);
-            (middle, DVector::from_vec(block.weights(middle)))
+        let inside = nodes.windows(2).map(|it| {
+            INSIDE.map(|share| {
+                let place = it[0] + share * (it[1] - it[0]);
+                (place, DVector::from_vec(block.weights(place)))
+            })
         });
         Some(Self {
-            middles: middles.collect(),
+            inside: inside.collect(),
             step: nodes
                 .windows(2)
                 .map(|it| it[1] - it[0])
@@ -273,7 +274,7 @@ impl Judged {
         let eigen = SymmetricEigen::new(&turned * &between * turned.transpose());
         let seen = eigen.eigenvectors.transpose() * (&self.whitening * &self.values);
         let (likelihood, sizes) = self.sizes(&eigen.eigenvalues, &seen);
-        let of_middle = |(at, weights): &(f64, DVector<f64>)| {
+        let of_place = |(at, weights): &(f64, DVector<f64>)| {
             let near = DVector::from_fn(count, |i, _| alike(*at, self.nodes[i]));
             let square = 1.0 - 2.0 * weights.dot(&near) + weights.dot(&(&between * weights));
             ln(square.max(ROUNDING))
@@ -281,8 +282,17 @@ impl Judged {
         ByLength {
             likelihood,
             sizes,
-            squares: self.middles.iter().map(of_middle).collect(),
+            squares: self
+                .inside
+                .iter()
+                .map(|it| it.each_ref().map(of_place))
+                .collect(),
         }
+    }
+
+    /// The middles of the intervals, with each node's weight there.
+    fn middles(&self) -> Vec<&(f64, DVector<f64>)> {
+        self.inside.iter().map(|[_, middle, _]| middle).collect()
     }
 
     /// The correlations of how far the function is from its curve in the middles of two intervals, for this
@@ -292,15 +302,12 @@ impl Judged {
             let d = (a - b) / length;
             exp(-0.5 * d * d)
         };
-        let (nodes, middles) = (self.nodes.len(), self.middles.len());
+        let all = self.middles();
+        let (nodes, middles) = (self.nodes.len(), all.len());
         let between = DMatrix::from_fn(nodes, nodes, |i, j| near(self.nodes[i], self.nodes[j]));
-        let to_nodes = DMatrix::from_fn(middles, nodes, |m, i| {
-            near(self.middles[m].0, self.nodes[i])
-        });
-        let weights = DMatrix::from_fn(middles, nodes, |m, i| self.middles[m].1[i]);
-        let own = DMatrix::from_fn(middles, middles, |m, n| {
-            near(self.middles[m].0, self.middles[n].0)
-        });
+        let to_nodes = DMatrix::from_fn(middles, nodes, |m, i| near(all[m].0, self.nodes[i]));
+        let weights = DMatrix::from_fn(middles, nodes, |m, i| all[m].1[i]);
+        let own = DMatrix::from_fn(middles, middles, |m, n| near(all[m].0, all[n].0));
         let crossed = &weights * to_nodes.transpose();
         let error = own - &crossed - crossed.transpose() + &weights * between * weights.transpose();
         let size: Vec<f64> = error

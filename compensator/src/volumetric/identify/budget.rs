@@ -2,7 +2,7 @@
 //!
 //! The errors found are linear in the readings, so that the variance of the tool's deviation is a sum over them
 //! (GUM 5.1): what each reading has by itself, by where it comes from; what functions do between their nodes
-//! where they were read, which readings share; what the readings scatter more than was stated (Birge's ratio);
+//! where they were read, and an error of the instrument that all of them have, which readings share; what the readings scatter more than was stated (Birge's ratio);
 //! the thermometers; and what functions do between their nodes at the place itself.
 //!
 //! | symbol | name here |
@@ -15,13 +15,14 @@ use units::{Celsius, Metres};
 
 use super::between::Extent;
 use super::design::{Design, between_square, error_row};
-use super::effect::u_of;
 use super::heat::add_heat;
 use super::{Axis, IdentifyError, Observation, Plan, Point, Reading};
 use crate::budget::{Contribution, Correlation, Evaluation, PlacesBudget};
 use crate::least_squares::{self, Fit};
 use crate::uncertainty::{propagate, rms};
 
+/// One error of the instrument, which all readings have.
+const IN_COMMON: &str = "scale and air of the instrument, common to all lines";
 /// What functions do between their nodes where they were read.
 const WHERE_READ: &str = "between nodes, where read";
 /// Readings that scatter more than was stated of them.
@@ -85,6 +86,8 @@ struct Parts {
     names: Vec<String>,
     /// By reading, the number of its name.
     numbers: Vec<usize>,
+    /// By reading, what one error of the instrument makes of it in units of its own uncertainty.
+    common: Vec<f64>,
 }
 
 impl Parts {
@@ -111,6 +114,7 @@ impl Parts {
             names,
             numbers,
             heat,
+            common: design.common(observations),
             design,
             fit,
         }
@@ -118,7 +122,7 @@ impl Parts {
 
     /// By contribution the variance at a place, over all three directions.
     fn squares(&self, plan: &Plan, (at, tool): ToolAt, above: &[f64]) -> Vec<f64> {
-        let mut squares = vec![0.0; self.names.len() + 4];
+        let mut squares = vec![0.0; self.names.len() + 5];
         for axis in Axis::ALL {
             let (readings, others) = squares.split_at_mut(self.names.len());
             let blocks = &self.design.blocks;
@@ -136,10 +140,12 @@ impl Parts {
             let at_the_place = between_square(plan, blocks, between, at, tool, |effect| {
                 effect.moved[axis.index()]
             });
-            others[0] += whole - square(&own);
+            let in_common: f64 = own.iter().zip(&self.common).map(|(a, b)| a * b).sum();
+            others[0] += whole - square(&own) - in_common * in_common;
             others[1] += (self.enlarged * self.enlarged - 1.0) * whole;
             others[2] += propagate(&row, &self.heat);
             others[3] += at_the_place;
+            others[4] += in_common * in_common;
         }
         squares
     }
@@ -171,11 +177,12 @@ impl Parts {
         };
         let of_readings = self.names.iter().enumerate().map(|(number, name)| {
             let own = observations.iter().zip(&self.numbers);
-            let own = own.filter(|it| *it.1 == number).map(|it| it.0.reading);
-            let u: Vec<f64> = own.clone().map(u_of).collect();
-            let is_angle = own
-                .into_iter()
-                .all(|it| matches!(it, Reading::Angle { .. }));
+            let own = own.filter(|it| *it.1 == number).map(|it| it.0);
+            // Without what it has in common with all others.
+            let u = own.clone().map(Observation::u_by_itself);
+            let u: Vec<f64> = u.collect();
+            let mut own = own.map(|it| it.reading);
+            let is_angle = own.all(|it| matches!(it, Reading::Angle { .. }));
             let unit = if is_angle { "rad" } else { "m" };
             Contribution::new(
                 name,
@@ -204,6 +211,7 @@ impl Parts {
                 Correlation::SharedReadings,
             ),
             shared(BETWEEN, 3, Correlation::BetweenPositions),
+            shared(IN_COMMON, 4, Correlation::CommonScale),
         ];
         of_readings.chain(others).collect()
     }
@@ -261,5 +269,10 @@ mod tests {
             ..Rig::default()
         };
         assert!(check(&noisy, 6).contains(&BEYOND.to_owned()));
+        let stretched = Rig {
+            in_common: 1e-6,
+            ..quiet
+        };
+        assert!(check(&stretched, 7).contains(&IN_COMMON.to_owned()));
     }
 }

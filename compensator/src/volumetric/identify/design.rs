@@ -76,6 +76,7 @@ impl Design {
             }
             Reading::Angle { deviation, u, .. } => deviation.is_finite() && u.value() > 0.0,
         };
+        let reading = reading && it.common.abs() < u_of(it.reading);
         let mut numbers = it.at.array().into_iter().chain(it.tool.array());
         if !(reading && numbers.all(f64::is_finite)) {
             return Err(IdentifyError::NotUsable { index });
@@ -108,7 +109,7 @@ impl Design {
             Reading::Length { deviation, .. } => deviation.value(),
             Reading::Angle { deviation, .. } => deviation.value(),
         };
-        let u = u_of(it.reading);
+        let u = it.u_by_itself();
         let errors = error_row(plan, &self.blocks, it.at, it.tool, above, |effect| {
             seen(it.reading, effect)
         });
@@ -173,8 +174,8 @@ impl Design {
         self
     }
 
-    /// The covariance of what the functions do between their nodes, as the readings see it in units of their
-    /// own uncertainties.
+    /// The covariance of what readings share, in units of their own uncertainties: what the functions do between their
+    /// nodes, and an error of the instrument that all of them have.
     fn shared(&self, plan: &Plan, observations: &[Observation]) -> DMatrix<f64> {
         let count = observations.len();
         let mut covariance = DMatrix::zeros(count, count);
@@ -189,7 +190,19 @@ impl Design {
             let between = &self.between;
             between.add_shared(number, block, &read, &mut covariance);
         }
+        let common = self.common(observations);
+        for (i, of_i) in common.iter().enumerate().filter(|it| *it.1 != 0.0) {
+            for (j, of_j) in common.iter().enumerate() {
+                covariance[(i, j)] += of_i * of_j;
+            }
+        }
         covariance
+    }
+
+    /// What one error of the instrument makes of each reading, in units of its own uncertainty.
+    pub(super) fn common(&self, observations: &[Observation]) -> Vec<f64> {
+        let each = observations.iter().zip(self.whitening.own());
+        each.map(|(it, u)| it.common / u).collect()
     }
 }
 

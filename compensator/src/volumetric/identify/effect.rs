@@ -1,6 +1,6 @@
 //! What one unit of an error does to the tool, and what a reading sees of it.
 
-use super::{Axis, Plan, Reading};
+use super::{Axis, Observation, Plan, Reading};
 use crate::volumetric::Point;
 use crate::volumetric::point::V3;
 
@@ -27,6 +27,14 @@ pub(super) fn seen(reading: Reading, effect: &Effect) -> f64 {
     match reading {
         Reading::Length { along, .. } => dot(along, effect.moved),
         Reading::Angle { about, .. } => effect.turn[about.index()],
+    }
+}
+
+impl Observation {
+    /// Its standard uncertainty without what all readings have in common, in its SI unit.
+    pub(super) fn u_by_itself(&self) -> f64 {
+        let u = u_of(self.reading);
+        (u * u - self.common * self.common).sqrt()
     }
 }
 

@@ -29,6 +29,9 @@
 //! temperatures are refused, and the uncertainties of the coefficients include those of the
 //! thermometers.
 //!
+//! What one error of the instrument does to all readings ([`Observation::common`]) is shared by them: what stretches every
+//! length alike makes the size of the volume uncertain, and no squareness.
+//!
 //! Readings that scatter more than their stated uncertainties are reported
 //! ([`Identified::scattered`]), with those that fit least.
 //!
@@ -165,6 +168,7 @@ pub struct Alignment {
 ///         deviation: Metres::from_um(um),
 ///         u: Metres::from_um(0.1),
 ///     },
+///     common: 0.0,
 /// };
 /// let readings = places.into_iter().zip([7.0, 8.0, 10.0]).map(read);
 /// let found = plan.identify(&readings.collect::<Vec<_>>())?;
@@ -227,6 +231,9 @@ pub struct Observation {
     pub run: usize,
     /// What was read.
     pub reading: Reading,
+    /// What all readings have in common of its standard uncertainty, with the sign that one error of the instrument has
+    /// here, in its SI unit: as scale and air stretch every length of a laser. 0 where nothing is.
+    pub common: f64,
 }
 
 /// What is unknown: the errors wanted, and what the instrument's settings leave open.
@@ -428,6 +435,8 @@ impl Plan {
 mod between_tests;
 #[cfg(test)]
 mod cause_tests;
+#[cfg(test)]
+mod common_tests;
 #[cfg(test)]
 mod rig;
 

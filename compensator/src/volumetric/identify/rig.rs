@@ -4,7 +4,7 @@
 use core::f64::consts::{PI, TAU};
 
 use units::MetresPerSecond;
-use units::portable::sin;
+use units::portable::{hypot, sin};
 
 use super::*;
 use crate::error_table::Limits;
@@ -37,6 +37,8 @@ pub(super) struct Rig {
     pub(super) stated: f64,
     /// Half waves along the travel at most.
     pub(super) waves: usize,
+    /// The relative standard uncertainty of every length, which is off by as much on all lines.
+    pub(super) in_common: f64,
 }
 
 impl Default for Rig {
@@ -49,6 +51,7 @@ impl Default for Rig {
             noise: 1.0,
             stated: 1.0,
             waves: 3,
+            in_common: 0.0,
         }
     }
 }
@@ -175,6 +178,11 @@ impl Rig {
         noise: &mut Noise,
     ) -> Vec<Observation> {
         let mut observations = Vec::new();
+        let stretched = if self.in_common > 0.0 {
+            noise.normal()
+        } else {
+            0.0
+        };
         for (run, line) in design.lines.iter().enumerate() {
             let (zero, lean) = (noise.within(1e-5), noise.within(1e-4));
             let way = line.to - line.from;
@@ -190,11 +198,17 @@ impl Rig {
                 let (value, usual) = read(truth, &real, at, lean);
                 let u = usual * self.stated;
                 let value = value + zero + u * self.noise * noise.normal();
+                let common = match line.optics {
+                    Optics::Linear => self.in_common * (at - line.from).distance().value(),
+                    Optics::Straightness(_) | Optics::Angle(_) => 0.0,
+                };
+                let (value, u) = (value + stretched * common, hypot(u, common));
                 observations.push(Observation {
                     at,
                     tool: (stated.arm)(run, line),
                     run,
                     reading: line.reading(value, u),
+                    common,
                 });
             }
         }

@@ -25,8 +25,8 @@ pub struct IdentifiedFunction {
     pub values: Vec<f64>,
     /// Their standard uncertainties.
     pub u: Vec<f64>,
-    /// For the middle of each interval between nodes, the standard uncertainty of how far the error is
-    /// from its curve there.
+    /// At a quarter, a half and three quarters of each interval between nodes, the standard uncertainty of how far
+    /// the error is from its curve there.
     pub u_between: Vec<f64>,
 }
 

@@ -104,6 +104,7 @@ pub(super) fn measure(
                 tool: line.tool,
                 run,
                 reading: line.reading(value + zero + u * chance.normal(), u),
+                common: 0.0,
             });
         }
     }

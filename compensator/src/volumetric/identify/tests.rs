@@ -131,6 +131,7 @@ fn along_line(
             tool,
             run,
             reading: reading(*at),
+            common: 0.0,
         })
         .collect()
 }
@@ -171,6 +172,7 @@ fn everywhere(
                     tool,
                     run: runs.len(),
                     reading,
+                    common: 0.0,
                 });
             }
             runs.push(OFFSET);
@@ -386,6 +388,7 @@ fn face_diagonals_tell_the_squareness_in_closed_form_and_by_least_squares() {
                 tool: Point::ZERO,
                 run,
                 reading,
+                common: 0.0,
             });
         }
     }
@@ -441,6 +444,7 @@ fn a_square_tells_squareness_and_two_straightnesses() {
                 tool: Point::ZERO,
                 run,
                 reading,
+                common: 0.0,
             });
         }
     }
@@ -518,6 +522,7 @@ fn an_autocollimator_tells_tilts() {
                 deviation: Radians(1e-6 * f64::from(n * n) + 7e-6),
                 u: Radians(1e-7),
             },
+            common: 0.0,
         })
         .collect();
     let found = plan.identify(&observations).unwrap();
@@ -547,6 +552,7 @@ fn plans_and_readings_that_do_not_fit_are_refused_by_number() {
             tool: Point::ZERO,
             run,
             reading,
+            common: 0.0,
         }]
     };
     let (index, run, runs) = (0, 1, 1);

@@ -114,6 +114,7 @@ impl Session {
                 tool: tool(),
                 run,
                 reading,
+                common: 0.0,
             });
         }
         let shown = warmth.map(|it| Celsius(it + noise * 0.03 * chance.normal()));
@@ -217,6 +218,7 @@ fn what_a_detector_saw_of_a_tilt_is_no_part_of_the_bend() {
                     tool,
                     run,
                     reading,
+                    common: 0.0,
                 });
             }
             session.runs.push(OFFSET);

@@ -135,6 +135,7 @@ fn of_series(args: &VolumetricArgs, config: &VolumetricConfig) -> Result<Given, 
                 tool: line.tool,
                 run: number,
                 reading: point.reading,
+                common: 0.0,
             };
             given
                 .readings

@@ -145,6 +145,7 @@ mod tests {
                 deviation: Metres(0.0),
                 u: Metres::from_um(0.02),
             },
+            common: 0.0,
         }
     }
 

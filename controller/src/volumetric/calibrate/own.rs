@@ -1,16 +1,24 @@
 //! What the machine's own detectors tell of its lines: straightnesses by the beams, a roll.
+//!
+//! What is stated of a displacement while the machine works is no statement about a straightness: it has the air of a
+//! few samples, how a beam is taken to have moved since its reference, and the width of the spot over what slides have
+//! gone aside since. References are means of many samples within minutes. So a straightness counts with the scatter of its
+//! means, with the width of the spot over its own size, and with what is stated of references; a roll likewise.
 
-use compensator::volumetric::identify::{Observation, Purpose, Reading};
+use compensator::uncertainty::combine;
+use compensator::volumetric::identify::{
+    Observation, Purpose, Reading, ReferenceLine, straightness,
+};
 use compensator::volumetric::{Axis, Point};
 use units::portable::hypot;
 use units::{Metres, Radians};
 
-use crate::volumetric::AXES;
 use crate::volumetric::calibrate::Session;
 use crate::volumetric::calibrate::plan::nodes;
-use crate::volumetric::settings::{point_of_mm, volume_axis};
+use crate::volumetric::settings::{beam_drift, point_of_mm, volume_axis};
+use crate::volumetric::{AXES, BeamConfig};
 
-/// The standard uncertainty of a straightness by a beam where nobody states that of its detectors: the air along it.
+/// The standard uncertainty of a straightness by a beam where nobody states any of it: the air along it.
 const BEAM_FLOOR: Metres = Metres(0.1e-6);
 /// By how much of its size such a reading may be wrong, as a standard uncertainty: the width of the spot, which is known
 /// to 1 % either way.
@@ -57,10 +65,8 @@ impl Session<'_> {
         run: usize,
     ) -> Option<Vec<Observation>> {
         let reference = self.beams[axis.index()].as_ref()?;
-        let beam = self.config.beam.each()[axis.index()]?;
-        let stated = beam.standard_uncertainty_um;
-        let own = stated.map_or(BEAM_FLOOR, Metres::from_um);
-        let beam = beam.on_the_slide()?;
+        let config = self.config.beam.each()[axis.index()]?;
+        let beam = config.on_the_slide()?;
         let record = self.references.content.beams.iter();
         let letter = ['x', 'y', 'z'][axis.index()];
         let record = record.clone().find(|it| it.axis == letter)?;
@@ -68,13 +74,18 @@ impl Session<'_> {
         let direction = core::array::from_fn(|k| f64::from(u8::from(k == along.index())));
         let u_mean = record.slider[place].standard_uncertainties_si.as_ref();
         let stops = self.stops_at_nodes(axis, &record.slider[place].positions_m);
-        let first = reference.slider(Metres(record.slider[place].positions_m[0]))[place];
+        let strayed = stops.iter().map(|(_, at)| reference.slider(*at)[place]);
+        let strayed: Vec<Metres> = strayed.collect();
+        // How the beam leans, and how far from the middle it meets the detector, is no part of a straightness.
+        let positions: Vec<Metres> = stops.iter().map(|it| it.1).collect();
+        let shape = straightness(&positions, &strayed, ReferenceLine::LeastSquares).ok()?;
         let chain = self.known.chain();
-        let each = stops.into_iter().map(|(index, position)| {
-            let strayed = reference.slider(position)[place];
+        let each = stops.into_iter().zip(strayed).zip(shape.deviations);
+        let each = each.map(|(((index, position), strayed), deviation)| {
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
-            let scale = (strayed - first).value() * BEAM_SCALE;
-            let u = hypot(hypot(own.value(), u_mean), scale);
+            let scale = deviation.value() * BEAM_SCALE;
+            let (own, of_end) = (u_straightness(config), self.u_of_end(axis, position));
+            let u = combine(&[own.value(), of_end.value(), u_mean, scale]);
             let at = self.on_axis(axis, position);
             // The slide's tilts act on the detector's place on it alone: not on what an offset of
             // the tool is added to.
@@ -88,9 +99,18 @@ impl Session<'_> {
                     deviation: strayed * chain.sense(axis),
                     u: Metres(u),
                 },
+                common: 0.0,
             }
         });
         Some(each.collect())
+    }
+
+    /// What the noise of the detector at the end makes of a mean that is brought to one place of the beam.
+    fn u_of_end(&self, axis: Axis, position: Metres) -> Metres {
+        let drift = self.config.beam.each()[axis.index()].and_then(beam_drift);
+        let samples = self.config.reference.map_or(0, |it| it.samples);
+        let u = self.end_noise[axis.index()].u_of_mean(samples);
+        Metres(drift.map_or(0.0, |it| it.fraction(position)) * u)
     }
 
     fn roll_by_detectors(&self, axis: Axis, run: usize) -> Option<Vec<Observation>> {
@@ -113,16 +133,20 @@ impl Session<'_> {
                     deviation: reference.at(position) * sense,
                     u: Radians(hypot(hypot(own, u_mean), scale)),
                 },
+                common: 0.0,
             }
         });
         Some(each.collect())
     }
 
-    /// What is stated of the detectors that see the roll of `axis`.
+    /// What is stated of references of the roll of `axis`, or else of that roll itself.
     fn u_roll(&self, axis: Axis) -> Radians {
         let mut each = self.config.roll.each().iter();
         let own = each.find(|it| volume_axis(it.axis) == axis);
-        let stated = own.and_then(|it| it.standard_uncertainty_arcsec);
+        let stated = own.and_then(|it| {
+            let of_references = it.reference_standard_uncertainty_arcsec;
+            of_references.or(it.standard_uncertainty_arcsec)
+        });
         stated.map_or(ROLL_FLOOR, Radians::from_arcsec)
     }
 
@@ -150,4 +174,11 @@ impl Session<'_> {
         let [x, y, z] = Axis::ALL.map(|it| if it == axis { position } else { low.along(it) });
         Point::new(x, y, z)
     }
+}
+
+/// What is stated of references of this beam, or else of a displacement.
+fn u_straightness(beam: &BeamConfig) -> Metres {
+    let stated = beam.reference_standard_uncertainty_um;
+    let stated = stated.or(beam.standard_uncertainty_um);
+    stated.map_or(BEAM_FLOOR, Metres::from_um)
 }

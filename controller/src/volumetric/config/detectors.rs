@@ -63,6 +63,11 @@ pub struct BeamConfig {
     /// how the beam is taken to move leave of it.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub standard_uncertainty_um: Option<f64>,
+    /// Of a straightness that a calibration takes from references of this beam, beside the scatter of their means and the
+    /// width of the spot: how straight the beam itself is in the air that stands along it. Without it as much as of a
+    /// displacement.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub reference_standard_uncertainty_um: Option<f64>,
     /// The detector on the slide, of four channels.
     #[schemars(extend("x-range" = "this or `slider_camera`"))]
     pub slider: Option<BeamDetectorConfig>,
@@ -299,6 +304,10 @@ pub struct RollConfig {
     /// Of a roll as it enters the correction.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub standard_uncertainty_arcsec: Option<f64>,
+    /// Of a roll that a calibration takes from references of these detectors, beside the scatter of their means and the
+    /// volts per millimetre. Without it as much as of a roll that enters the correction.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub reference_standard_uncertainty_arcsec: Option<f64>,
     /// An older sample says nothing about now.
     #[schemars(extend("x-range" = "at least two sampling periods"))]
     pub age_max_ms: f64,

@@ -15,7 +15,7 @@ mod task;
 
 use core::time::Duration;
 
-use compensator::length_correction::{LengthCorrection, combined};
+use compensator::length_correction::{LengthCorrection, combined, in_common};
 use compensator::uncertainty::combine;
 use compensator::volumetric::Point;
 use compensator::volumetric::identify::{Observation, Reading};
@@ -73,6 +73,8 @@ pub struct LineReading {
     pub tool: Point,
     /// By how much the tool was off, against the start of the line.
     pub reading: Reading,
+    /// What all lines have in common of its standard uncertainty, as [`Observation`] has it.
+    pub common: f64,
     /// Standard deviation of the samples averaged, of the path that is counted.
     pub scatter: Metres,
     /// When.
@@ -87,6 +89,7 @@ impl LineReading {
             tool: self.tool,
             run,
             reading: self.reading,
+            common: self.common,
         }
     }
 }
@@ -196,6 +199,11 @@ impl WorkVolume<'_> {
             at,
             tool: line.task.tool,
             reading,
+            common: match line.measure {
+                Measure::Along => in_common(&budget).value() * path.value().signum(),
+                // What stretches micrometres of path is nothing.
+                Measure::Across { .. } | Measure::Tilt { .. } => 0.0,
+            },
             scatter: counted.standard_deviation,
             when: counted.at,
         })
