@@ -361,6 +361,10 @@ pub struct RunView {
     /// What the person was told after the last question.
     #[serde(default)]
     pub said: Vec<String>,
+    /// Job: what was told of each point as soon as it was reached, as the command line tells it. Each is an event `point`
+    /// besides, with its figures, and a run in an event `run` leaves them out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reached: Vec<String>,
     /// Who stopped it, when somebody did.
     pub stopped: Option<Stopped>,
     /// Why it has no result.
@@ -418,6 +422,7 @@ impl RunView {
             can_resume: false,
             question: None,
             said: Vec::new(),
+            reached: Vec::new(),
             stopped: None,
             cause: None,
             result: serde_json::Value::Null,
@@ -425,6 +430,15 @@ impl RunView {
             out_of_tolerance: None,
             journal: None,
         }
+    }
+
+    /// As it is told when something of it has changed: its points were told before.
+    pub(crate) fn changed(&self) -> serde_json::Value {
+        let mut data = serde_json::json!(self);
+        if let Some(members) = data.as_object_mut() {
+            members.remove("reached");
+        }
+        data
     }
 }
 
@@ -470,7 +484,7 @@ pub struct Event {
     /// When by the machine's clock, in seconds.
     pub clock_s: f64,
     /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`,
-    /// `calibration`, `question`, `warning`.
+    /// `calibration`, `question`, `point`, `warning`.
     pub kind: String,
     /// Of which axis, motion or run; empty for the machine.
     pub of: String,

@@ -8,7 +8,7 @@ use serde_json::Value;
 use tests::Edit;
 
 use crate::programs::{Bench, check_says, live_rigs, number, text};
-use crate::serve::keep;
+use crate::serve::{ask, keep};
 
 const JOB: &str = include_str!("../../configs/jobs/linear.toml");
 
@@ -145,12 +145,14 @@ fn a_kept_axis_does_a_job_as_it_does_without_a_service() {
         write(&bench, "job.toml", JOB);
         bench.run(&["calibrate"]).with_code(0);
         let words = ["run", "machine.toml", "job.toml", "--yes"];
-        let here = bench.run(&words).with_code(0);
+        let here = bench.run(&words);
         let service = keep(&bench);
         refused(&bench);
         // The hand that the client lends says that it is done.
         bench.run(&words[..3]).with_code(0);
-        let there = bench.run(&words).with_code(0);
+        let there = bench.run(&words);
+        assert_eq!(told(&there.said), told(&here.said));
+        let (here, there) = (here.with_code(0), there.with_code(0));
         let keys = |value: &Value| {
             let keys = value.as_object().expect("an object").keys();
             keys.cloned().collect::<Vec<_>>()
@@ -163,10 +165,54 @@ fn a_kept_axis_does_a_job_as_it_does_without_a_service() {
                 assert_eq!(there[key], here[key], "{there}");
             }
         }
+        let run = keeps_what_it_told(&bench);
         interrupted_there(&bench);
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
+        tells_programs(&bench, &run, &there);
         assert_eq!(bench.stop(), Some(0));
+    }
+}
+
+/// What was said of each point as it was reached, but for its figures: they are other ones each time.
+fn told(said: &str) -> Vec<String> {
+    let lines = said.lines().filter(|it| it.starts_with("  repetition "));
+    let lines = lines.map(|line| {
+        let (point, place) = line.split_once("): at ").expect("which, and where");
+        let words = place.chars().filter(|it| !it.is_ascii_digit());
+        format!("{point}): at {}", words.collect::<String>())
+    });
+    let lines: Vec<_> = lines.collect();
+    assert!(!lines.is_empty(), "no point was told: {said}");
+    lines
+}
+
+/// The last run, and as much of what it told as somebody does not know.
+fn keeps_what_it_told(bench: &Bench) -> Value {
+    let (_, runs) = ask(bench.folder(), "GET /v1/runs", &Value::Null);
+    let run = runs.as_array().and_then(|it| it.last()).expect("a run");
+    let reached = run["reached"].as_array().expect("what was told");
+    assert_eq!(reached.len(), 12, "{run}");
+    let look = format!("GET /v1/runs/{}?heard=10", text(&run["id"]));
+    let (_, rest) = ask(bench.folder(), &look, &Value::Null);
+    assert_eq!(rest["reached"], Value::from(&reached[10..]), "{rest}");
+    run.clone()
+}
+
+/// Each point was an event with the figures that are in the result.
+fn tells_programs(bench: &Bench, run: &Value, done: &Value) {
+    let reached = run["reached"].as_array().expect("what was told");
+    let events = bench.records().join("service/journal.jsonl");
+    let events = fs::read_to_string(events).expect("events are kept");
+    let events = events
+        .lines()
+        .map(|it| serde_json::from_str(it).expect("an object"));
+    let of_run = |it: &Value| it["kind"] == "point" && it["of"] == run["id"];
+    let points: Vec<Value> = events.filter(of_run).collect();
+    assert_eq!(points.len(), reached.len());
+    for (event, (told, point)) in points.iter().zip(reached.iter().zip(self::points(done))) {
+        let data = &event["data"];
+        assert_eq!((&data["text"], &data["value"]), (told, point));
     }
 }
 
@@ -175,10 +221,13 @@ fn interrupted_there(bench: &Bench) {
     let long = JOB.edit("after_s = 0.5", "after_s = 80000.0");
     write(bench, "long.toml", &long);
     let before = jobs(bench).len();
-    let mut process = bench.start(&["run", "machine.toml", "long.toml", "--yes"]);
-    process.wait_until(|| jobs(bench).len() > before && reached(bench) >= 2);
-    process.signal(Signal::SIGINT);
-    let ended = process.end();
+    let process = bench.start(&["run", "machine.toml", "long.toml", "--yes"]);
+    // It is told while the axis waits there, and not when the job has ended.
+    let ended = process.end_heard(|process, line| {
+        if line.starts_with("  repetition 1, point 2 of 6 ") {
+            process.signal(Signal::SIGINT);
+        }
+    });
     assert!(ended.said.contains("--resume"), "{ended:?}");
     ended.with_code(130);
     let other = ["run", "machine.toml", "job.toml", "--yes", "--resume"];

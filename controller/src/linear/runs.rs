@@ -9,9 +9,9 @@ use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::linear::job::asked::Asking;
 use crate::linear::job::judge::job_judge;
-use crate::linear::{Job, LinearTeller, VerifyOptions};
+use crate::linear::{Job, LinearTeller, Reached, VerifyOptions};
 use crate::run::missing;
-use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Told, Travel, Work};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -142,7 +142,11 @@ fn do_job(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
             help: "plan it again".into(),
         });
     }
-    let mut person = Asking(work.person);
+    let tells = words.map(|it| move |point: &Reached| (it.reached)(job, calibration, point));
+    let mut person = Asking {
+        person: work.person,
+        tells: tells.as_ref().map(|it| it as &dyn Fn(&Reached) -> Told),
+    };
     let mut stage = work.machine.linear(axis)?;
     let done = match &task.resume {
         None => stage.run_job(work.store, job, &mut person),

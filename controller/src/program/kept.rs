@@ -275,13 +275,21 @@ impl Service {
     ) -> Result<Value, Failure> {
         let mut is_heard = false;
         let mut trouble = None;
+        let mut points = 0;
         loop {
             let is_ending = stop.is_requested() || trouble.is_some();
             if is_ending && !is_heard {
                 is_heard = self.end(path, ender, output)?;
             }
             let wait_s = WAIT.as_secs_f64();
-            let seen = ask_on(&self.at, "GET", &format!("{path}?wait_s={wait_s}"), "")?;
+            // Only a run has points, and those that were told need not come again.
+            let known = match points {
+                0 => String::new(),
+                points => format!("&heard={points}"),
+            };
+            let look = format!("{path}?wait_s={wait_s}{known}");
+            let seen = ask_on(&self.at, "GET", &look, "")?;
+            points += jobs::say_reached(&seen, output);
             if !is_ending {
                 trouble = meanwhile(&seen).err();
             }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::teller::Told;
 use crate::failure::Failure;
 
 /// What a person is asked.
@@ -48,4 +49,7 @@ pub trait Person {
 
     /// Says something that needs no answer.
     fn tell(&mut self, text: &str);
+
+    /// Says, as soon as it is so, that a point of a job was reached. No question begins with it.
+    fn reached(&mut self, point: Told);
 }

@@ -179,6 +179,7 @@ impl Keeper {
         self.ticks += 1;
         self.events.set_now(machine.now());
         self.take_notes();
+        self.take_reached();
         let asked = self.take_question(machine);
         for _ in 0..ORDERS_A_TICK {
             let Ok(letter) = self.inbox.try_recv() else {

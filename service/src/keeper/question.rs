@@ -6,14 +6,14 @@ use std::rc::Rc;
 use machine::{Driving, Machine};
 use serde_json::json;
 use truestage::Failure;
-use truestage::runs::{Person, Question};
+use truestage::runs::{Person, Question, Told};
 
 use super::Keeper;
 use super::seat::Task;
 use super::stop::stopped_by;
 use crate::problem::{Code, Problem};
 use crate::request::AnswerRequest;
-use crate::view::QuestionView;
+use crate::view::{QuestionView, ToldView};
 
 /// The longest line that is an answer, in characters.
 const ANSWER_MAX: usize = 200;
@@ -26,6 +26,8 @@ pub(super) struct Talk {
     answer: Option<String>,
     /// What the next question begins with; without one, what the run says at its end.
     said: Vec<String>,
+    /// Points that were reached since the last tick.
+    reached: Vec<Told>,
 }
 
 /// The person of a procedure: whoever answers its run.
@@ -49,6 +51,10 @@ impl Person for Asker {
     fn tell(&mut self, text: &str) {
         self.0.borrow_mut().said.push(text.to_owned());
     }
+
+    fn reached(&mut self, point: Told) {
+        self.0.borrow_mut().reached.push(point);
+    }
 }
 
 impl Keeper {
@@ -56,6 +62,19 @@ impl Keeper {
     pub(crate) fn asker(&mut self) -> Asker {
         *self.talk.borrow_mut() = Talk::default();
         Asker(Rc::clone(&self.talk))
+    }
+
+    /// Points that were reached since the last tick are told, each by an event of its own.
+    pub(super) fn take_reached(&mut self) {
+        let reached = core::mem::take(&mut self.talk.borrow_mut().reached);
+        for point in reached {
+            let Some(run) = self.runs.under_way() else {
+                return;
+            };
+            let id = run.view.id.clone();
+            run.view.reached.push(point.text.clone());
+            self.events.push("point", &id, json!(ToldView::from(point)));
+        }
     }
 
     /// What was asked since the last tick becomes part of the run. What is to be done by hand is asked when everything

@@ -373,6 +373,7 @@ impl Keeper {
     /// The procedure of the run `id` has ended.
     pub(crate) fn end_procedure(&mut self, id: &str) {
         self.mode = Mode::Idle;
+        self.take_reached();
         let said = self.take_said();
         if let Ok(run) = self.runs.find(id) {
             run.is_over = true;
@@ -467,7 +468,7 @@ impl Keeper {
         if run.view.state.is_end() {
             run.task.judged = None;
         }
-        let data = json!(run.view);
+        let data = run.view.changed();
         self.events.push("run", id, data);
     }
 

@@ -3,14 +3,18 @@
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::linear::job::JobOperator;
-use crate::runs::{Person, Question};
+use crate::linear::job::{JobOperator, Reached};
+use crate::runs::{Person, Question, Told};
 
 /// What whoever keeps the machine calls it.
 pub(crate) const GO_ON: &str = "go_on";
 
-/// Somebody who says when a job goes on.
-pub(crate) struct Asking<'p>(pub(crate) &'p mut dyn Person);
+/// Somebody who says when a job goes on, and is told of each point.
+pub(crate) struct Asking<'p> {
+    pub(crate) person: &'p mut dyn Person,
+    /// How a point is told; `None` where nobody has the words.
+    pub(crate) tells: Option<&'p dyn Fn(&Reached) -> Told>,
+}
 
 impl JobOperator for Asking<'_> {
     fn ask(&mut self, text: &str) -> Result<(), Failure> {
@@ -18,10 +22,16 @@ impl JobOperator for Asking<'_> {
         let text = format!(
             "{text}\nThe axis holds its place under power, and moves as soon as this is answered: be out of its way first."
         );
-        self.0.ask(Question::of_work(GO_ON, text, task))
+        self.person.ask(Question::of_work(GO_ON, text, task))
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {
-        Ok(self.0.answer()?.is_some())
+        Ok(self.person.answer()?.is_some())
+    }
+
+    fn reached(&mut self, point: &Reached) {
+        if let Some(tells) = self.tells {
+            self.person.reached(tells(point));
+        }
     }
 }

@@ -9,8 +9,17 @@ use super::{Service, VOLUME, Waiting, refuse, stop_request, tell};
 use crate::Failure;
 use crate::program::MachineArgs;
 use crate::program::exchange::{ask, plain};
-use crate::program::linear::job::GO_ON_ASKED;
+use crate::program::linear::job::{GO_ON_ASKED, noted};
 use crate::program::output::{Ended, Output};
+
+/// Says which points were reached; how many these are.
+pub(super) fn say_reached(run: &Value, output: Output) -> usize {
+    let reached = run["reached"].as_array().map_or(&[][..], Vec::as_slice);
+    for text in reached {
+        output.note(&noted(&plain(text.as_str().unwrap_or_default())));
+    }
+    reached.len()
+}
 
 impl Service {
     /// Does the job that `request` has on the axis; `by` is whether nobody is waited for, and the hand of an emulated

@@ -177,8 +177,13 @@ impl JobOperator for Beside {
     }
 
     fn reached(&mut self, it: &Reached) {
-        self.output.note(&reached_text(it));
+        self.output.note(&noted(&reached_text(it)));
     }
+}
+
+/// A point among what else is told meanwhile.
+pub(crate) fn noted(reached: &str) -> String {
+    format!("  {reached}")
 }
 
 fn interval_text(interval: Option<(Metres, Metres)>) -> String {
@@ -191,12 +196,12 @@ fn interval_value(interval: Option<(Metres, Metres)>) -> Value {
     interval.map_or(Value::Null, |(from, to)| json!([from.mm(), to.mm()]))
 }
 
-fn reached_text(it: &Reached) -> String {
+pub(crate) fn reached_text(it: &Reached) -> String {
     let (number, of) = it.number;
     let place = it.moved.place.unwrap_or(it.moved.encoder);
     let name = &it.name;
     format!(
-        "  repetition {}, point {number} of {of} ({name}): at {:.6} mm, {}",
+        "repetition {}, point {number} of {of} ({name}): at {:.6} mm, {}",
         it.repetition,
         place.mm(),
         moved::uncertainty_of(&it.moved)
@@ -282,16 +287,18 @@ pub(crate) fn done_text(job: &Job, done: &JobDone) -> String {
     text + &format!("\n  each point in {}", done.journal.display())
 }
 
+pub(crate) fn reached_value(job: &Job, calibration: &str, it: &Reached) -> Value {
+    let mut value = moved::value(&job.axis, &it.moved, Some(calibration));
+    value["repetition"] = json!(it.repetition);
+    value["number"] = json!(it.number.0);
+    value["name"] = json!(it.name);
+    value["approach"] = json!(it.moved.approach.symbol().to_string());
+    value["interval_mm"] = interval_value(it.interval);
+    value
+}
+
 pub(crate) fn done_value(job: &Job, done: &JobDone) -> Value {
-    let point = |it: &Reached| {
-        let mut value = moved::value(&job.axis, &it.moved, Some(&done.calibration));
-        value["repetition"] = json!(it.repetition);
-        value["number"] = json!(it.number.0);
-        value["name"] = json!(it.name);
-        value["approach"] = json!(it.moved.approach.symbol().to_string());
-        value["interval_mm"] = interval_value(it.interval);
-        value
-    };
+    let point = |it: &Reached| reached_value(job, &done.calibration, it);
     json!({
         "axis": job.axis,
         "calibration": done.calibration,

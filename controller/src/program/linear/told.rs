@@ -16,6 +16,10 @@ pub(crate) static TELLER: LinearTeller = LinearTeller {
     calibrated,
     verified,
     moved,
+    reached: |job, calibration, point| Told {
+        text: job::reached_text(point),
+        value: job::reached_value(job, calibration, point),
+    },
     job_done: |job, done| Told {
         text: job::done_text(job, done),
         value: job::done_value(job, done),

@@ -311,6 +311,7 @@ function showRun(run) {
     said.append(...run.said.map((it) => element("p", it)));
     parts.push(said);
   }
+  if (run.reached && run.reached.length) parts.push(element("p", run.reached.at(-1)));
   if (run.question) {
     const same = asked && asked.dataset.number === String(run.question.number);
     parts.push(same ? asked : asking(run));
@@ -387,12 +388,13 @@ function follow(after) {
   stream.addEventListener("open", () => told(showAll()));
   stream.addEventListener("error", () => { byId("state").textContent = "connection lost; trying again …"; });
   stream.addEventListener("sample", (message) => showAxes(JSON.parse(message.data)));
-  for (const kind of ["machine", "axis", "position", "motion", "run", "question", "stop", "lease", "calibration", "warning"]) {
+  for (const kind of ["machine", "axis", "position", "motion", "run", "question", "point", "stop", "lease", "calibration", "warning"]) {
     stream.addEventListener(kind, async (message) => {
       const event = JSON.parse(message.data);
       showEvent(event);
       if (kind === "machine" || kind === "lease") showMachine(await ask("GET", "/v1/machine"));
-      if (kind === "run") showRun(event.data.id ? event.data : { ...plans.get(event.of), ...event.data });
+      if (kind === "run") showRun({ ...plans.get(event.of), ...event.data });
+      if (kind === "point" && plans.has(event.of)) showRun({ ...plans.get(event.of), reached: [event.data.text] });
       if (kind === "question") showRun({ ...plans.get(event.of), question: event.data.answer ? null : event.data });
     });
   }

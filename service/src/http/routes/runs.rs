@@ -4,6 +4,8 @@ use axum::Json;
 use axum::extract::State as Of;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
+use serde::Deserialize;
+use utoipa::IntoParams;
 
 use super::super::guard::{Asks, Body, By, Named};
 use super::super::identity::Admitted;
@@ -55,9 +57,21 @@ pub(super) async fn plan(
     Ok((StatusCode::CREATED, location, Json(state.desk.run(&id)?)))
 }
 
+/// How long an answer may be held back, and what of it is known.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Looked {
+    /// Seconds to wait for the end; 300 at most. At once when left out.
+    #[param(minimum = 0, maximum = 300)]
+    wait_s: Option<f64>,
+    /// So many of its `reached` points were heard before, and are left out.
+    heard: Option<u64>,
+}
+
 /// A run, once it has ended or the time to wait is over.
 #[utoipa::path(
-    get, path = "/runs/{id}", tag = "runs", params(("id" = String, Path, description = "Its name"), Wait),
+    get, path = "/runs/{id}", tag = "runs", params(("id" = String, Path, description = "Its name"), Looked),
     responses(
         (status = 200, description = "The run", body = RunView),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
@@ -66,10 +80,14 @@ pub(super) async fn plan(
 pub(super) async fn run(
     Of(state): Of<State>,
     Named(id): Named,
-    wait: MaybeQuery<Wait>,
+    looked: MaybeQuery<Looked>,
 ) -> Result<Json<RunView>, Problem> {
-    let asked = query(wait)?.until(|| state.desk.run(&id), |it| it.state.is_end());
-    Ok(Json(asked.await?))
+    let Looked { wait_s, heard } = query(looked)?;
+    let asked = Wait { wait_s }.until(|| state.desk.run(&id), |it| it.state.is_end());
+    let mut run = asked.await?;
+    let heard = usize::try_from(heard.unwrap_or_default()).unwrap_or(usize::MAX);
+    run.reached.drain(..heard.min(run.reached.len()));
+    Ok(Json(run))
 }
 
 /// Begins a planned run.
