@@ -17,6 +17,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
     offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify, Stage::Job],
     resumed: |_, _, stage| matches!(stage, Stage::Calibrate | Stage::Verify | Stage::Job),
+    warm_up_min: |_| None,
     refuse: Task::without_warm_up,
     planned,
     perform,

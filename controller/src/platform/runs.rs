@@ -19,6 +19,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
     offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
     resumed: |_, _, _| false,
+    warm_up_min: |_| None,
     refuse,
     planned,
     perform,

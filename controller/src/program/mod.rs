@@ -274,7 +274,8 @@ struct CalibrateArgs {
     /// Verify with it at once, and go back to what was used before where it makes things worse.
     #[arg(long)]
     verify: bool,
-    /// Three axes: let them move to and fro for this long, then measure again what heat changed.
+    /// Three axes: let them move to and fro for this long, then measure again what heat changed. With --resume for as long as
+    /// the run was to, when not given; and not again where four fifths of the warmth are left.
     #[arg(long, value_name = "MINUTES")]
     warm_up_min: Option<f64>,
 }

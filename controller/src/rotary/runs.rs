@@ -23,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
     offered: &[Stage::Zero, Stage::Calibrate, Stage::Verify],
     resumed,
+    warm_up_min: |_| None,
     refuse: Task::without_warm_up,
     planned,
     perform,

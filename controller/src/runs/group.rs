@@ -1,5 +1,7 @@
 //! Axes that are run together.
 
+use std::path::Path;
+
 use machine::Stage;
 use machine::records::Store;
 
@@ -55,6 +57,8 @@ pub(crate) struct GroupRuns {
     pub(crate) offered: &'static [Stage],
     /// Which of them can go on where they were left.
     pub(crate) resumed: fn(&MachineConfig, &str, Stage) -> bool,
+    /// For how many minutes a run with this journal was to let its axes become warm.
+    pub(crate) warm_up_min: fn(journal: &Path) -> Option<f64>,
     /// Options that it has no use for.
     pub(crate) refuse: fn(&Task) -> Result<(), Failure>,
     /// What a run of this group will do.
@@ -111,6 +115,11 @@ impl Group {
     /// Whether a run of it can go on where it was left.
     pub fn is_resumed(&self, config: &MachineConfig, stage: Stage) -> bool {
         (self.runs.resumed)(config, &self.name, stage)
+    }
+
+    /// For how many minutes a run that left `journal` was to let its axes become warm; `None` where it was not.
+    pub fn warm_up_min(&self, journal: &Path) -> Option<f64> {
+        (self.runs.warm_up_min)(journal)
     }
 
     /// Refuses options that a run of it has no use for.

@@ -10,6 +10,9 @@ use units::{Metres, Radians};
 use crate::store::IdentityRecord;
 use crate::volumetric::{AXES, BeamReferencesContent, FunctionShape};
 
+/// Nobody warms a machine up for longer: seventy days.
+pub(crate) const MINUTES_MAX: f64 = 1e5;
+
 /// What a line is read with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -114,6 +117,10 @@ pub struct VolumePlanEntry {
     pub fixed_m: [f64; 3],
     /// Who the drives of x, y and z are; empty where that is not known.
     pub drives: Vec<IdentityRecord>,
+    /// For how many minutes all axes go to and fro before the lines that are read warm; `None` where something else
+    /// warms them, where none are read warm, and in files of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up_min: Option<f64>,
 }
 
 /// What the detectors read before the first line: everything after it counts from there.

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use compensator::volumetric::model::Chain;
 
+use crate::volumetric::entries::MINUTES_MAX;
 use crate::volumetric::sound::references as beams;
 use crate::volumetric::{AXES, error_name};
 use crate::volumetric::{
@@ -135,6 +136,11 @@ fn plan(read: &VolumeLog, it: &VolumePlanEntry) -> Judged {
         planned(&format!("lines[{at}]"), line)?;
     }
     number("thermometer_u_k", it.thermometer_u_k, &KELVIN_U)?;
+    optional(
+        "warm_up_min",
+        it.warm_up_min,
+        &limits(0.0, MINUTES_MAX, "min"),
+    )?;
     let drives = it.drives.len();
     let expected = || "none, or those of x, y and z".to_owned();
     is("drives", drives == 0 || drives == 3, expected, || {

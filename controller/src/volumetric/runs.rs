@@ -13,6 +13,7 @@ use crate::runs::{
     Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
 };
 use crate::volumetric::asked::Asking;
+use crate::volumetric::calibrate::minutes_of;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::chosen;
 use crate::volumetric::handle::WorkVolume;
@@ -32,6 +33,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
         Stage::Job,
     ],
     resumed: |_, _, stage| stage == Stage::Calibrate,
+    warm_up_min: minutes_of,
     refuse,
     planned,
     perform,

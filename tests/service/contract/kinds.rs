@@ -1,5 +1,6 @@
 //! Runs of machines whose axes work together: an alignment platform, and three axes of a volume.
 
+use core::time::Duration;
 use std::path::Path;
 
 use mock_bus::plant::{LineOptics, LineSetUp};
@@ -118,10 +119,7 @@ fn three_axes_read_a_line_that_somebody_sets_up_and_stand_enabled_afterwards() {
             ..RunRequest::of(RunKind::Calibrate, Some("volume"))
         };
         let planned = bed.client.plan(&anna(), &plan).unwrap();
-        let planned = bed
-            .client
-            .run(&planned, core::time::Duration::ZERO)
-            .unwrap();
+        let planned = bed.client.run(&planned, Duration::ZERO).unwrap();
         let asks = &planned.plan.asks;
         assert!(asks.len() > 8 && asks[0].contains("line 1 of "), "{asks:?}");
 
@@ -221,10 +219,7 @@ fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
         let planned = |warm_up_min| {
             let request = request(RunKind::Calibrate, warm_up_min);
             let id = bed.client.plan(&anna(), &request).unwrap();
-            bed.client
-                .run(&id, core::time::Duration::ZERO)
-                .unwrap()
-                .plan
+            bed.client.run(&id, Duration::ZERO).unwrap().plan
         };
         let (cold, warm) = (planned(None), planned(Some(2.5)));
         assert!(warm.asks.len() > cold.asks.len(), "{warm:?}");
@@ -255,6 +250,55 @@ fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
         assert!(journal.contains("\"warm\":true"), "{journal}");
     };
     each_here(new, zeroed(body));
+}
+
+/// The first line of a calibration that becomes warm is read; then the service is gone, and the next one goes on.
+#[test]
+fn three_axes_that_were_to_become_warm_go_on_with_the_next_service() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let new = || Stage::new(Rig::InProcess, (VOLUMETRIC, SEED), folder.path(), quick);
+    let stage = new();
+    let client = InProcess::of(&stage);
+    let bed = Bed {
+        stage: &stage,
+        client: &client,
+    };
+    bed.client.zero(&anna(), None);
+    let asked = RunRequest {
+        warm_up_min: Some(2.5),
+        ..RunRequest::of(RunKind::Calibrate, None)
+    };
+    let id = bed.client.plan(&anna(), &asked).unwrap();
+    let planned = bed.client.run(&id, Duration::ZERO).unwrap().plan;
+    let first = bed.asked(&id);
+    let line = line_of(&first.task);
+    bed.stage
+        .simulation(move |machine| machine.set_up_line(&line));
+    bed.answer(&id, first.number, "done").unwrap();
+    let second = bed.asked(&id);
+    stage.end();
+
+    let stage = new();
+    let client = InProcess::of(&stage);
+    let bed = Bed {
+        stage: &stage,
+        client: &client,
+    };
+    let found = bed.client.runs();
+    let [left] = &found[..] else {
+        panic!("{found:?}");
+    };
+    assert_eq!((left.state, left.can_resume), (RunState::Paused, true));
+    assert_eq!(left.plan, planned, "its warm lines and its time are known");
+    let id = left.id.clone();
+    bed.client.zero(&anna(), None);
+    bed.client.resume(&anna(), &id).unwrap();
+    // Not the first line again.
+    assert_eq!(bed.asked(&id).task, second.task);
+    bed.client.abort(&anna(), &id).unwrap();
+    let run = bed.client.run(&id, PATIENCE).unwrap();
+    assert_eq!(run.state, RunState::Stopped, "{run:?}");
+    stage.end();
 }
 
 /// Once, and by the library alone.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use compensator::volumetric::function::Shape;
 use machine::records::{ReadJournal, read_journal};
+use tests::Edit;
 use tests::volume::{Volume, good, quick};
 use truestage::Failure;
 use truestage::emulated::{Emulated, HallDrift};
@@ -223,4 +224,95 @@ fn what_is_not_the_same_machine_any_more_is_not_continued() {
         "{text}"
     );
     assert_eq!(asked.len(), 0);
+}
+
+/// A corner of the volume, which has lines of few places.
+fn small(text: String) -> String {
+    quick(text)
+        .edit(
+            "high_mm = [500.0, 400.0, 300.0]",
+            "high_mm = [100.0, 100.0, 100.0]",
+        )
+        .edit("from_mm = [0.0, 0.0, 150.0]", "from_mm = [0.0, 0.0, 50.0]")
+        .edit(
+            "to_mm = [500.0, 400.0, 150.0]",
+            "to_mm = [100.0, 100.0, 50.0]",
+        )
+}
+
+/// Cold for half an hour, warm for a shift, and cold again.
+fn of_a_shift(text: String) -> String {
+    text.edit(
+        "{ from_h = 0.0, share = 0.8 }",
+        "{ from_h = 0.0, share = 0.0 }",
+    )
+    .edit(
+        "{ from_h = 4.0, share = 0.1 }",
+        "{ from_h = 0.5, share = 1.0 }",
+    )
+    .edit(
+        "{ from_h = 4.5, share = 1.0 }",
+        "{ from_h = 8.0, share = 0.0 }",
+    )
+}
+
+#[test]
+fn a_run_that_goes_on_warms_up_again_where_less_than_four_fifths_of_the_warmth_are_left() {
+    let mut volume = Volume::zeroed(1, small, of_a_shift);
+    let span = Duration::from_secs(2 * 3600);
+    let warm_up = WarmUp::Idle(span);
+    calibrate_by(&mut volume, warm_up, None, Some(1))
+        .0
+        .unwrap_err();
+    let path = journal_of(&volume);
+    let plan = read(&path).log.plan.expect("it has one");
+    let lines = plan.lines.iter().enumerate();
+    let warm = lines.filter(|(_, it)| it.warm && !it.by_detectors);
+    let warm: Vec<usize> = warm.map(|(at, _)| at + 1).collect();
+    assert!(warm.len() > 3, "{warm:?}");
+
+    // By the machine's clock, until the person goes home before that line.
+    let mut goes_on_to = |volume: &mut Volume, line: usize| {
+        let begun = volume.bench.machine.now();
+        let (left, _) = calibrate_by(volume, warm_up, Some(&path), Some(line));
+        let left = left.unwrap_err();
+        assert!(
+            matches!(left, Failure::Machine(machine::Failure::Interrupted)),
+            "{left}"
+        );
+        volume.bench.machine.now().since(begun)
+    };
+    // Cold lines, and the first that is read warm.
+    assert!(goes_on_to(&mut volume, warm[1]) > span);
+    assert_eq!(goes_on_to(&mut volume, warm[2]).as_secs() / 3600, 0);
+    let night = Duration::from_secs(14 * 3600);
+    good(volume.bench.machine.idle(night));
+    for axis in ["x", "y", "z"] {
+        good(volume.bench.machine.enable(axis));
+    }
+    assert!(
+        goes_on_to(&mut volume, warm[3]) > span,
+        "it had cooled down"
+    );
+}
+
+#[test]
+fn a_run_that_goes_on_becomes_warm_for_as_long_as_it_was_to() {
+    let mut volume = Volume::zeroed(1, small, |text| text);
+    let minutes = 2.5;
+    let warm_up = WarmUp::of_minutes(minutes).expect("a time");
+    let left = calibrate_by(&mut volume, warm_up, None, Some(1)).0;
+    left.unwrap_err();
+    let path = journal_of(&volume);
+    let plan = read(&path).log.plan.expect("it has one");
+    assert_eq!(plan.warm_up_min, Some(minutes));
+    // Whoever goes on with it says nothing of that, or another time.
+    for warm_up in [WarmUp::None, WarmUp::of_minutes(3.0).expect("a time")] {
+        let left = calibrate_by(&mut volume, warm_up, Some(&path), Some(1)).0;
+        let left = left.unwrap_err();
+        assert!(
+            matches!(left, Failure::Machine(machine::Failure::Interrupted)),
+            "{left}"
+        );
+    }
 }

@@ -10,7 +10,8 @@
 //! beams, where there are beams; a beam is straighter than what a straightedge tells.
 //!
 //! Every reading is written down when it is made. A run that was interrupted is continued at its
-//! first line that is not whole, as long as its references still hold (`resume`). What is evaluated
+//! first line that is not whole, as long as its references still hold (`resume`), and warms up anew
+//! when it has cooled down (`warmth`). What is evaluated
 //! is what was written down: the journal alone gives the same errors again.
 //!
 //! A result that cannot be applied, whose readings scatter much more than was stated of them (`scatter`),
@@ -29,6 +30,7 @@ pub(crate) mod plan;
 mod readings;
 mod resume;
 mod scatter;
+mod warmth;
 
 use core::time::Duration;
 use std::path::{Path, PathBuf};
@@ -52,12 +54,15 @@ use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
 };
 use crate::volumetric::chosen::use_geometry;
+use crate::volumetric::entries::MINUTES_MAX;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::line::LineOperator;
 use crate::volumetric::reference::{References, require_thermometers_certified};
 use crate::volumetric::settings::{beam_drift, function_shape, point_of_mm};
 use crate::volumetric::thermometers::Thermometry;
-use crate::volumetric::{AgreementRecord, UnknownRecord, VolumeLog, VolumeReferencesEntry};
+use crate::volumetric::{
+    AgreementRecord, UnknownRecord, VolumeLog, VolumePlanEntry, VolumeReferencesEntry,
+};
 use crate::volumetric::{GEOMETRY, VolumetricFailure};
 use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
@@ -65,12 +70,11 @@ use machine::Stage;
 
 use crate::volumetric::reference::mean::Noise;
 use known::Known;
+pub(crate) use warmth::minutes_of;
+use warmth::{is_as_warm, warm_up_of};
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
-
-/// Nobody warms a machine up for longer: seventy days.
-const MINUTES_MAX: f64 = 1e5;
 
 /// How the machine becomes warm between cold and warm lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +93,14 @@ impl WarmUp {
     pub fn of_minutes(minutes: f64) -> Option<Self> {
         let is_a_time = minutes > 0.0 && minutes < MINUTES_MAX;
         is_a_time.then(|| Self::Travel(Duration::from_secs_f64(minutes * 60.0)))
+    }
+
+    /// For how many minutes all axes go to and fro, where they do.
+    const fn minutes(self) -> Option<f64> {
+        match self {
+            Self::Travel(span) => Some(span.as_secs_f64() / 60.0),
+            Self::None | Self::Idle(_) => None,
+        }
     }
 }
 
@@ -130,6 +142,8 @@ struct Session<'a> {
     end_noise: [Noise; 3],
     thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
+    /// Whether it is as warm as when it was interrupted among the lines that are read warm.
+    is_still_warm: bool,
     /// All lines, as in the plan.
     lines: Vec<StandardLine>,
     /// What was read up to now.
@@ -141,7 +155,8 @@ impl WorkVolume<'_> {
     /// wanted) lets it become warm and reads those again that tell what warmth does; finds the
     /// errors, stores and activates them with their references. With `resume` the lines that are
     /// whole in that journal are not read again, and its references stay what everything counts
-    /// from.
+    /// from. Where nothing is said of `warm_up` then, the axes go to and fro as that journal says, unless
+    /// the machine is still warm.
     ///
     /// # Errors
     /// When an axis is not zeroed, a line cannot be set up or read, the readings do not tell all
@@ -173,9 +188,17 @@ impl WorkVolume<'_> {
         operator: &mut dyn LineOperator,
     ) -> Result<VolumetricCalibrated, Failure> {
         let resume = options.resume.as_deref();
+        let warm_up = match (warm_up, resume) {
+            (WarmUp::None, Some(journal)) => warm_up_of(journal),
+            (given, _) => given,
+        };
         let config = self.config.clone();
         let drives = self.volume_drives(&config);
         let (plan, lines) = volume_plan(&config, warm_up != WarmUp::None, drives)?;
+        let plan = VolumePlanEntry {
+            warm_up_min: warm_up.minutes(),
+            ..plan
+        };
         let header = self.header("calibrate", None)?;
         let (mut journal, read) =
             resume::open(store, &header, plan, resume, self.core.config_hash)?;
@@ -246,7 +269,7 @@ impl WorkVolume<'_> {
         journal: &mut Journal<VolumeLog>,
     ) -> Result<(), Failure> {
         let total = session.lines.len();
-        let mut is_warm = false;
+        let mut is_warm = session.is_still_warm;
         for at in 0..total {
             self.core
                 .observer()
@@ -255,7 +278,6 @@ impl WorkVolume<'_> {
                 continue;
             }
             if session.is_warm_line(at) && !is_warm {
-                // Also in a run that is continued: it may have cooled down.
                 self.end_lines(session.operator)?;
                 self.become_warm(warm_up)?;
                 is_warm = true;
@@ -282,9 +304,11 @@ impl WorkVolume<'_> {
         let own = config.calibrate.clone();
         let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
         let taken = self.take_references()?;
+        let mut is_still_warm = false;
         let entry = match read.references.take() {
             Some(kept) => {
                 self.still_holds(&config, &own, &read, &kept, &taken)?;
+                is_still_warm = is_as_warm(&read, &kept.temperatures_c, &taken.temperatures);
                 kept
             }
             None => {
@@ -323,6 +347,7 @@ impl WorkVolume<'_> {
             end_noise: Default::default(),
             thermometry,
             operator,
+            is_still_warm,
             lines,
             read,
         })

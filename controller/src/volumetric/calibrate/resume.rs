@@ -54,9 +54,11 @@ fn same_plan(
     before: &VolumePlanEntry,
     now: &VolumePlanEntry,
 ) -> Result<(), StoreError> {
-    // A journal of an earlier program does not say how errors run between their nodes.
+    // A journal of an earlier program does not say how errors run between their nodes; and it may be warmed up for another
+    // time than at first: what that comes to is read.
     let before = &VolumePlanEntry {
         shape: before.shape.or(now.shape),
+        warm_up_min: now.warm_up_min,
         ..before.clone()
     };
     // By far the most frequent one, and not to be found in a list of lines.

@@ -73,15 +73,17 @@ impl Keeper {
         let Some(at) = groups.position(|it| it.group.journals() == journals) else {
             return;
         };
-        let Ok(plan) = self.plan_of(kind, None, at) else {
+        let grouped = &self.groups[at];
+        let warm_up_min = grouped.group.warm_up_min(&found.journal);
+        let Ok(plan) = self.plan_of(kind, warm_up_min, at) else {
             return;
         };
-        let grouped = &self.groups[at];
         let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let id = found.journal.file_stem().unwrap_or_default();
         let id = id.to_string_lossy().into_owned();
         let request = RunRequest {
             uncompensated: kind == RunKind::Verify && found.header.calibration.is_none(),
+            warm_up_min,
             start: false,
             ..RunRequest::of(kind, Some(&group.name))
         };

@@ -1,0 +1,115 @@
+//! Whether a calibration that is continued is still warm, or is warmed up anew.
+//!
+//! A line that is read warm is read whole at whatever warmth it then has: what warmth does is found with the errors, by what the
+//! thermometers showed at each line. So nothing is wrong with a line that is read a little less warm than the one before it. It
+//! tells less, because the standard uncertainty of a thermal error goes with one over the rise of temperature. Where
+//! [`WARMTH_LEFT`] of the rise is left, it tells as much but for a quarter, and that is in the stated uncertainty; where less is
+//! left, the machine is warmed up anew, for the whole time. The clock is not asked: how fast a machine cools down is
+//! its own affair, and the thermometers see it.
+
+use std::path::Path;
+
+use machine::records::read_journal;
+use units::Celsius;
+
+use super::WarmUp;
+use crate::volumetric::VolumeLog;
+
+/// How much of the rise must be left.
+const WARMTH_LEFT: f64 = 0.8;
+
+/// For how many minutes a run with this journal was to let all axes go to and fro; `None` where it was not, or where
+/// that cannot be read.
+pub(crate) fn minutes_of(journal: &Path) -> Option<f64> {
+    read_journal::<VolumeLog>(journal)
+        .ok()?
+        .log
+        .plan?
+        .warm_up_min
+}
+
+/// The same as it is done. What is wrong with the journal is said when it is continued.
+pub(super) fn warm_up_of(journal: &Path) -> WarmUp {
+    let warm_up = minutes_of(journal).and_then(WarmUp::of_minutes);
+    warm_up.unwrap_or(WarmUp::None)
+}
+
+/// Whether enough is left of what the machine had warmed up by where it was interrupted: from `cold`, where its references were
+/// taken, to the last line that was read warm. The thermometer that had risen most says it. Without such a line it is
+/// not known how warm it had become.
+pub(super) fn is_as_warm(read: &VolumeLog, cold: &[f64], now: &[Celsius]) -> bool {
+    let Some(plan) = &read.plan else {
+        return false;
+    };
+    // Of what detectors read, the references' temperatures are kept.
+    let is_warm = |line: usize| {
+        let line = plan.lines.get(line);
+        line.is_some_and(|it| it.warm && !it.by_detectors)
+    };
+    let Some(warm) = read.whole.iter().rfind(|it| is_warm(it.line)) else {
+        return false;
+    };
+    let each = cold.iter().zip(&warm.temperatures_c).zip(now);
+    let each = each.map(|((cold, warm), now)| (warm - cold, now.value() - cold));
+    let most = each.max_by(|(rise, _), (other, _)| rise.total_cmp(other));
+    // A comparison with NaN is false: then it is warmed up.
+    most.is_some_and(|(rise, left)| rise > 0.0 && left >= WARMTH_LEFT * rise)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volumetric::{LineEntry, LineReadEntry, VolumePlanEntry};
+
+    const COLD: [f64; 2] = [20.0, 20.5];
+
+    /// A line read cold, one read warm by an interferometer, and one by detectors.
+    fn read(whole: &[(usize, [f64; 2])]) -> VolumeLog {
+        let line = |warm, by_detectors| LineEntry {
+            warm,
+            by_detectors,
+            ..LineEntry::default()
+        };
+        let plan = VolumePlanEntry {
+            lines: vec![line(false, false), line(true, false), line(true, true)],
+            ..VolumePlanEntry::default()
+        };
+        let whole = whole.iter().map(|(line, celsius)| LineReadEntry {
+            line: *line,
+            temperatures_c: celsius.to_vec(),
+            at_s: 0.0,
+        });
+        VolumeLog {
+            plan: Some(plan),
+            whole: whole.collect(),
+            ..VolumeLog::default()
+        }
+    }
+
+    #[track_caller]
+    fn check(whole: &[(usize, [f64; 2])], now: [f64; 2], expected: bool) {
+        let now = now.map(Celsius);
+        assert_eq!(is_as_warm(&read(whole), &COLD, &now), expected, "{now:?}");
+    }
+
+    #[test]
+    fn the_thermometer_that_had_risen_most_says_whether_enough_is_left() {
+        let warm = [(0, [20.1, 20.6]), (1, [25.0, 21.0])];
+        check(&warm, [25.0, 21.0], true);
+        check(&warm, [24.01, 20.5], true);
+        check(&warm, [23.99, 21.0], false);
+        check(&warm, [26.0, 21.0], true);
+        check(&warm, [f64::NAN, 21.0], false);
+    }
+
+    #[test]
+    fn what_was_not_read_warm_is_not_known_to_be_warm() {
+        check(&[], [25.0, 25.0], false);
+        check(&[(0, [25.0, 25.0])], [25.0, 25.0], false);
+        // The last of those that were set up counts.
+        check(&[(1, [25.0, 21.0]), (2, COLD)], [25.0, 21.0], true);
+        check(&[(2, COLD)], [25.0, 21.0], false);
+        // Nothing became warmer: nothing is left of it.
+        check(&[(1, COLD)], COLD, false);
+    }
+}
