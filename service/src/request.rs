@@ -257,6 +257,10 @@ pub struct RunRequest {
     /// corners are passed within that length; without it runs a cubic spline, at rest at both ends. At most 600 s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathRows>,
+    /// Path: what joins its rows, `spline` or `linear 50um`, where they do not say it themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 100, example = "linear 50um")]
+    pub join: Option<String>,
     /// Job: what `truestage run JOB.toml` takes, as a text. At most 2000 points, repetitions counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 1000000)]
@@ -285,6 +289,7 @@ impl RunRequest {
             uncompensated: false,
             warm_up_min: None,
             path: None,
+            join: None,
             job: None,
             beyond: false,
             resume: None,

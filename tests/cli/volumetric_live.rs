@@ -248,13 +248,13 @@ fn three_axes_are_zeroed_calibrated_verified_and_moved_from_process_to_process()
         assert_eq!(taken["geometry"], geometry);
         remembers(&live);
         moves(&live);
-        follows(&live);
-        kept(&live, &geometry);
+        let departure = follows(&live);
+        kept(&live, &geometry, &departure);
     }
 }
 
 /// Through a service paths are followed and refused as without one, and calibrations are chosen.
-fn kept(live: &Live, geometry: &Value) {
+fn kept(live: &Live, geometry: &Value, departure: &Value) {
     let words = ["serve", "machine.toml", "--listen", "unix:truestage.sock"];
     let mut service = Process::start(&mut live.command(&words));
     let socket = live.folder.path().join("truestage.sock");
@@ -262,7 +262,7 @@ fn kept(live: &Live, geometry: &Value) {
         let answers = UnixStream::connect(&socket).is_ok();
         answers && live.run_nowhere(&["status"]).code == Some(0)
     });
-    follows(live);
+    assert_eq!(&follows(live), departure);
     let id = text(geometry);
     let chosen = live.run_nowhere(&["cal", "activate", "machine.toml", &id[..12]]);
     let chosen = chosen.with_code(0);
@@ -357,8 +357,8 @@ fn moves(live: &Live) {
     check_error(&unknown, &["x, y, z"]);
 }
 
-/// Paths that all axes follow, and paths that none does.
-fn follows(live: &Live) {
+/// Paths that all axes follow, and paths that none does. Where one departs from the joins of its rows most.
+fn follows(live: &Live) -> Value {
     // From 0 to 2 mm in two seconds, without a jerk: 10 s³ - 15 s⁴ + 6 s⁵.
     let rows = (0..=50).map(|n: u32| {
         let share = f64::from(n) / 50.0;
@@ -373,7 +373,8 @@ fn follows(live: &Live) {
         .with_code(0);
     assert_eq!(first["points"], points);
     assert!(first["memory"]["memory"].is_string(), "{first}");
-    let next = live.run(&["run", "machine.toml", "path.csv"]).with_code(0);
+    let words = ["run", "machine.toml", "path.csv", "--join", "spline"];
+    let next = live.run(&words).with_code(0);
     assert_eq!(
         (&next["points"], &next["corrected"]),
         (&points, &true.into())
@@ -397,4 +398,5 @@ fn follows(live: &Live) {
             "something was moved: {refused}"
         );
     }
+    next["largest_departure"].clone()
 }

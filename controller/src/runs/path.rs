@@ -4,7 +4,7 @@ use core::fmt;
 use core::time::Duration;
 use std::sync::Arc;
 
-use machine::engine::CsvPath;
+use machine::engine::{CsvPath, Join};
 use machine::records::Store;
 use units::Metres;
 
@@ -41,29 +41,32 @@ impl JudgedPath {
     }
 }
 
-type Judging = dyn Fn(&Store, &str, bool) -> Result<JudgedPath, Failure> + Send;
+type Judging = dyn Fn(&Store, (&str, Option<Join>), bool) -> Result<JudgedPath, Failure> + Send;
 
 /// Judges paths, on whatever thread that is done: long ones take seconds.
 pub struct PathJudge(Box<Judging>);
 
 impl PathJudge {
     pub(crate) fn new(
-        judging: impl Fn(&Store, &str, bool) -> Result<JudgedPath, Failure> + Send + 'static,
+        judging: impl Fn(&Store, (&str, Option<Join>), bool) -> Result<JudgedPath, Failure>
+        + Send
+        + 'static,
     ) -> Self {
         Self(Box::new(judging))
     }
 
-    /// Judges the path with these `rows`, point by point as it will be driven, corrected by what is in `store` or not.
+    /// Judges the path with these `rows`, point by point as it will be driven, corrected by what is in `store` or not. Without
+    /// a `join` they are joined as they say themselves.
     ///
     /// # Errors
     /// It is to be corrected, and nothing was measured; the first row and column that cannot be read, or the first point that cannot be driven.
     pub fn judge(
         &self,
         store: &Store,
-        rows: &str,
+        (rows, join): (&str, Option<Join>),
         is_corrected: bool,
     ) -> Result<JudgedPath, Failure> {
-        (self.0)(store, rows, is_corrected)
+        (self.0)(store, (rows, join), is_corrected)
     }
 }
 

@@ -144,11 +144,11 @@ const PATH: &str = "path";
 
 fn paths(machine: &mut Machine) -> Result<PathJudge, Failure> {
     let judge = machine.volumetric()?.path_judge()?;
-    Ok(PathJudge::new(move |store, rows, is_corrected| {
+    Ok(PathJudge::new(move |store, (rows, join), is_corrected| {
         if is_corrected {
             require_measured(store)?;
         }
-        let path = judge.judge((Path::new(PATH), rows), None, is_corrected)?;
+        let path = judge.judge((Path::new(PATH), rows), join, is_corrected)?;
         Ok(JudgedPath::new(path, judge.period()))
     }))
 }

@@ -38,25 +38,19 @@ impl Join {
     /// When it says something else.
     pub(super) fn of_comment(text: &str) -> Option<Result<Self, ()>> {
         let said = text.trim_start_matches('#').trim().strip_prefix(MARK)?;
-        Some(Self::parse(said))
+        Some(Self::of_text(said).ok_or(()))
     }
 
-    /// The file `rows` with a comment above it that says so. A file that says another join itself is none that was
-    /// judged by this one.
-    pub fn said_above(self, rows: &str) -> String {
-        let rows = rows.strip_prefix('\u{feff}').unwrap_or(rows);
-        format!("# {MARK} {self}\n{rows}")
-    }
-
-    fn parse(said: &str) -> Result<Self, ()> {
+    /// What `spline` or `linear 50um` says; `None` for anything else.
+    pub fn of_text(said: &str) -> Option<Self> {
         let mut words = said.split_whitespace();
         match (words.next(), words.next(), words.next()) {
-            (Some("spline"), None, _) => Ok(Self::Spline),
-            (Some("linear"), Some(blend), None) => match length(blend) {
-                Some(blend) if blend.value() > 0.0 => Ok(Self::Linear { blend }),
-                _ => Err(()),
-            },
-            _ => Err(()),
+            (Some("spline"), None, _) => Some(Self::Spline),
+            (Some("linear"), Some(blend), None) => {
+                let blend = length(blend).filter(|it| it.value() > 0.0)?;
+                Some(Self::Linear { blend })
+            }
+            _ => None,
         }
     }
 }
@@ -66,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_comment_says_what_joins_rows_and_is_written_as_it_is_read() {
+    fn a_comment_says_what_joins_rows_and_a_join_is_written_as_it_is_read() {
         for (text, expected) in [
             ("# join: spline", Some(Ok(Join::Spline))),
             (
@@ -85,10 +79,7 @@ mod tests {
         ] {
             assert_eq!(Join::of_comment(text), expected, "{text}");
             if let Some(Ok(join)) = expected {
-                let above = join.said_above("\u{feff}time_s,x_mm");
-                let (comment, rows) = above.split_once('\n').unwrap();
-                assert_eq!(Join::of_comment(comment), Some(Ok(join)));
-                assert_eq!(rows, "time_s,x_mm");
+                assert_eq!(Join::of_text(&join.to_string()), Some(join));
             }
         }
     }

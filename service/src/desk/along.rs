@@ -3,13 +3,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use machine::engine::Join;
 use truestage::Failure;
 use truestage::runs::{AskedJob, JobJudge, PathJudge};
 
 use super::Desk;
 use crate::order::Judged;
 use crate::problem::{Code, Problem};
-use crate::request::{RunKind, RunRequest};
+use crate::request::{PathRows, RunKind, RunRequest};
 
 /// Who judges paths and jobs.
 #[derive(Debug, Default)]
@@ -53,6 +54,7 @@ impl Desk {
                 "leave `uncompensated` out",
             ));
         }
+        let join = join_of(request, rows)?;
         let rows = rows.csv()?;
         require_short(&rows)?;
         let mut judges = self.shared.judges.paths.iter();
@@ -62,7 +64,8 @@ impl Desk {
             Problem::new(Code::NotOffered, what, "three axes of a volume do")
         })?;
         let judge = judge.lock().unwrap_or_else(PoisonError::into_inner);
-        let judged = judge.judge(&self.shared.store, &rows, !request.uncompensated);
+        let is_corrected = !request.uncompensated;
+        let judged = judge.judge(&self.shared.store, (&rows, join), is_corrected);
         Ok(Judged::Path {
             path: judged.map_err(refused)?,
             group: group.clone(),
@@ -107,6 +110,7 @@ fn refuse_what_is_of_others(request: &RunRequest) -> Result<(), Problem> {
     let is_calibration = request.kind == RunKind::Calibrate;
     let given = [
         ("path", "path", request.path.is_some() && !is_path),
+        ("join", "path", request.join.is_some() && !is_path),
         ("job", "job", request.job.is_some() && !is_job),
         ("beyond", "job", request.beyond && !is_job),
         ("resume", "job", request.resume.is_some() && !is_job),
@@ -127,6 +131,24 @@ fn refuse_both(request: &RunRequest) -> Result<(), Problem> {
     }
     let what = "`aside` together with `verify`: what is kept aside is not verified";
     Err(Problem::new(Code::Refused, what, "leave one of them out"))
+}
+
+/// What joins the rows, where it is said beside them.
+fn join_of(request: &RunRequest, rows: &PathRows) -> Result<Option<Join>, Problem> {
+    let said = match (request.join.as_deref(), rows.join()) {
+        (Some(of_run), Some(of_rows)) if of_run != of_rows => {
+            let what = format!("`join` = {of_run:?}, and the rows say {of_rows:?}");
+            return Err(Problem::new(Code::Refused, what, "leave one of them out"));
+        }
+        (of_run, of_rows) => of_run.or(of_rows),
+    };
+    let join = said.map(|said| {
+        Join::of_text(said).ok_or_else(|| {
+            let what = format!("`join` = {said:?} joins no rows");
+            Problem::new(Code::Refused, what, "write `spline`, or `linear 50um`")
+        })
+    });
+    join.transpose()
 }
 
 /// What is wrong with what was sent is not wrong with the configuration.

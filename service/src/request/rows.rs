@@ -29,11 +29,11 @@ pub struct PathTable {
     /// What each column is, with its unit: `time_s`, `x_mm`, `y_mm`, `z_mm`.
     #[schema(min_items = 2, max_items = 16)]
     pub columns: Vec<String>,
-    /// What joins the rows: `spline`, or `linear 50um`.
+    /// What joins the rows, as `join` of the run says it: `spline`, or `linear 50um`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 100, example = "linear 50um")]
     pub join: Option<String>,
-    /// A number for each column, in each row. The first row is line 2 in what is said of them, with `join` line 3.
+    /// A number for each column, in each row. The first row is line 2 in what is said of them.
     #[schema(min_items = 2, max_items = 100000)]
     pub rows: Vec<Vec<f64>>,
 }
@@ -55,6 +55,14 @@ impl PathRows {
             Self::Table(table) => table.csv().map(Cow::Owned),
         }
     }
+
+    /// What a table says that joins them.
+    pub(crate) fn join(&self) -> Option<&str> {
+        match self {
+            Self::Csv(_) => None,
+            Self::Table(table) => table.join.as_deref(),
+        }
+    }
 }
 
 impl PathTable {
@@ -65,15 +73,7 @@ impl PathTable {
             let what = format!("`path`: {other:?} is the name of no column");
             return refused(what, "the columns are time_s, x_mm, y_mm, z_mm");
         }
-        let mut text = match &self.join {
-            None => String::new(),
-            Some(join) if join.contains(['\n', '\r']) => {
-                let what = format!("`path`: {join:?} joins no rows");
-                return refused(what, "`join` is `spline`, or `linear 50um`");
-            }
-            Some(join) => format!("# join: {join}\n"),
-        };
-        text += &self.columns.join(",");
+        let mut text = self.columns.join(",");
         text.push('\n');
         for (number, row) in (1..).zip(&self.rows) {
             if row.len() != self.columns.len() {
@@ -109,10 +109,9 @@ mod tests {
         assert_eq!(read(table).unwrap(), text);
         assert_eq!(read(&serde_json::json!(text).to_string()).unwrap(), text);
         let joined = table.replacen('{', r#"{"join": "linear 50um", "#, 1);
-        assert_eq!(
-            read(&joined).unwrap(),
-            format!("# join: linear 50um\n{text}")
-        );
+        assert_eq!(read(&joined).unwrap(), text);
+        let joined: PathRows = serde_json::from_str(&joined).unwrap();
+        assert_eq!(joined.join(), Some("linear 50um"));
     }
 
     #[test]
@@ -123,10 +122,6 @@ mod tests {
                 "row 1: 2 numbers for 1",
             ),
             (r#"{"columns": ["a\n0"], "rows": []}"#, "no column"),
-            (
-                r#"{"join": "spline\n0,1", "columns": ["a"], "rows": []}"#,
-                "joins no rows",
-            ),
             (r#"{"columns": ["a"], "rows": [["1"]]}"#, "columns"),
             (r#"{"rows": []}"#, "CSV as a text"),
             ("[[0, 1]]", "CSV as a text"),

@@ -473,6 +473,19 @@ fn follows_paths(bed: &Bed<'_>) {
     };
     let slip = path("0,60,40,30\n1,6O,40,30\n");
     refused(&slip, Code::Refused, &["line 3, column x_mm", "`6O`"]);
+    let joined = |request: &RunRequest, join: &str| RunRequest {
+        join: Some(join.to_owned()),
+        ..request.clone()
+    };
+    let slip_too = joined(&slip, "linear 50um");
+    refused(&slip_too, Code::Refused, &["line 3, column x_mm", "`6O`"]);
+    refused(
+        &joined(&slip, "circles"),
+        Code::Refused,
+        &["`join`", "circles"],
+    );
+    let no_path = joined(&RunRequest::of(RunKind::Verify, None), "spline");
+    refused(&no_path, Code::Refused, &["`join` is for"]);
     let beyond = path("0,499,40,30\n1,501,40,30\n");
     refused(&beyond, Code::Refused, &["outside the calibrated"]);
     let hasty = path("0,60,40,30\n0.1,90,40,30\n");

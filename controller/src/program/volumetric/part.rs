@@ -51,11 +51,19 @@ pub(crate) fn run(
         // What cannot be followed is said with the names of here.
         let path = judged(args, (file, &rows), join, !uncompensated)?;
         output.note(&before_it_moves(file, &path));
-        let kind = if is_first { "first_part" } else { "path" };
-        let rows = join.map_or(rows.clone(), |it| it.said_above(&rows));
-        let request = json!({"kind": kind, "path": rows, "uncompensated": uncompensated});
-        service.follow(args, request, output)
+        service.follow(args, asked_of_service(&rows, join, how), output)
     })
+}
+
+/// The same as a run of a service: its lines are those of the file.
+fn asked_of_service(
+    rows: &str,
+    join: Option<Join>,
+    (is_first, uncompensated): (bool, bool),
+) -> Value {
+    let kind = if is_first { "first_part" } else { "path" };
+    let join = join.map(|it| it.to_string());
+    json!({"kind": kind, "path": rows, "join": join, "uncompensated": uncompensated})
 }
 
 fn followed_here(
@@ -370,12 +378,36 @@ mod tests {
         }
     }
 
-    fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
+    fn machine() -> (Machine, Store) {
         let toml = include_str!("../../../../configs/machines/volumetric.toml");
         let loaded = config::parse(toml, "volumetric.toml").unwrap();
-        let mut machine = Machine::new(&loaded, Box::new(Nobody));
+        let store = loaded.config.machine.store();
+        (Machine::new(&loaded, Box::new(Nobody)), store)
+    }
+
+    fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
+        judge_joined(text, None, is_corrected)
+    }
+
+    fn judge_joined(
+        text: &str,
+        join: Option<Join>,
+        is_corrected: bool,
+    ) -> Result<CsvPath, Failure> {
+        let mut machine = machine().0;
         let judge = machine.volumetric().unwrap().path_judge().unwrap();
-        judge.judge((Path::new("path.csv"), text), None, is_corrected)
+        judge.judge((Path::new("path.csv"), text), join, is_corrected)
+    }
+
+    /// As a service judges what it is asked.
+    fn judge_there(asked: &Value) -> Failure {
+        let (mut machine, store) = machine();
+        let group = crate::groups(machine.config()).swap_remove(0);
+        let judge = group.path_judge(&mut machine).unwrap().unwrap();
+        let rows = asked["path"].as_str().unwrap();
+        let join = asked["join"].as_str();
+        let join = join.map(|it| Join::of_text(it).unwrap());
+        judge.judge(&store, (rows, join), false).unwrap_err()
     }
 
     /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.
@@ -440,6 +472,26 @@ mod tests {
             unknown.to_string().contains("line 1: `# join: circles`"),
             "{unknown}"
         );
+    }
+
+    #[test]
+    fn a_service_names_the_lines_of_the_file_whatever_joins_its_rows() {
+        let tight = Join::Linear {
+            blend: Metres::from_um(1.0),
+        };
+        let slip = corner("# by hand\n").replace("2,120", "2,12O");
+        for (rows, join, line) in [
+            (&slip, None, "line 4, column x_mm"),
+            (&slip, Some(Join::Spline), "line 4, column x_mm"),
+            (&slip, Some(tight), "line 4, column x_mm"),
+            (&corner(""), Some(tight), "the corner in line 3"),
+            (&corner("# by hand\n"), Some(tight), "the corner in line 4"),
+        ] {
+            let here = judge_joined(rows, join, false).unwrap_err().to_string();
+            assert!(here.contains(line), "{here}");
+            let there = judge_there(&asked_of_service(rows, join, (false, true)));
+            assert_eq!(here.replace("path.csv", "path"), there.to_string());
+        }
     }
 
     #[test]
