@@ -11,7 +11,9 @@ use crate::linear::job::asked::Asking;
 use crate::linear::job::judge::job_judge;
 use crate::linear::{Job, LinearTeller, Reached, VerifyOptions};
 use crate::run::missing;
-use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Told, Travel, Work};
+use crate::runs::{
+    Change, Found, Group, GroupRuns, Planned, Task, Told, Travel, Work, each_usable,
+};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -178,10 +180,7 @@ fn load(
 }
 
 fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
-    for change in changes {
-        if let Some(id) = &change.id {
-            machine.linear(&change.pointer)?.usable(store, id)?;
-        }
-    }
-    Ok(())
+    each_usable(changes, |axis, id| {
+        machine.linear(axis)?.usable(store, id).map(drop)
+    })
 }

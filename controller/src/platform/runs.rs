@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::platform::target::parts;
 use crate::platform::together::MOVES;
 use crate::platform::{PlatformFailure, PlatformTeller};
-use crate::runs::{Change, Found, Group, GroupRuns, Moved, Planned, Task, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Moved, Planned, Task, Work, each_usable};
 
 /// What its screws are called together.
 const WHOLE: &str = "platform";
@@ -156,10 +156,7 @@ fn load(
 
 fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
     let platform = machine.platform()?;
-    for change in changes {
-        if let Some(id) = &change.id {
-            platform.usable(store, &change.pointer, id)?;
-        }
-    }
-    Ok(())
+    each_usable(changes, |screw, id| {
+        platform.usable(store, screw, id).map(drop)
+    })
 }

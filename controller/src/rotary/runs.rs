@@ -17,7 +17,7 @@ use crate::rotary::asked::Asking;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::table::RotaryTable;
 use crate::run::missing;
-use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work};
+use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work, each_usable};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -223,13 +223,8 @@ fn load(
 }
 
 fn usable(machine: &mut Machine, store: &Store, changes: &[Change]) -> Result<(), Failure> {
-    for change in changes {
-        if let Some(id) = &change.id {
-            machine
-                .rotary(&change.pointer)?
-                .subject()
-                .usable(store, id)?;
-        }
-    }
-    Ok(())
+    each_usable(changes, |axis, id| {
+        let table = machine.rotary(axis)?;
+        table.subject().usable(store, id).map(drop)
+    })
 }

@@ -2,6 +2,8 @@
 
 use machine::records::{Store, StoreError};
 
+use crate::failure::Failure;
+
 /// What somebody wants to be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
@@ -93,6 +95,21 @@ pub(super) fn chosen_among(
             all.collect()
         }
     }
+}
+
+/// Asks of each calibration that is used from now on, by its pointer and its name, whether it can be.
+///
+/// # Errors
+/// Those of `usable`, at the first that cannot.
+pub(crate) fn each_usable(
+    changes: &[Change],
+    mut usable: impl FnMut(&str, &str) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut used = changes.iter();
+    used.try_for_each(|change| match &change.id {
+        Some(id) => usable(&change.pointer, id),
+        None => Ok(()),
+    })
 }
 
 /// Writes what is used from now on; all of it was read and can be used.

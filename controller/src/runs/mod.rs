@@ -24,7 +24,7 @@ pub use task::{Found, Task};
 pub use teller::{Teller, Told};
 pub use together::{GroupMove, GroupMoved, Judge, Part, PartMoved, Place};
 
-pub(crate) use choice::write;
+pub(crate) use choice::{each_usable, write};
 pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]

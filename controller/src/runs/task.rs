@@ -81,8 +81,8 @@ impl Task {
         let is_calibration = self.stage == Stage::Calibrate;
         match (self.aside, self.verify) {
             (true, true) => refused(
-                "what is kept aside is not verified: it is not used",
-                "leave `aside` or `verify` out",
+                "`aside` together with `verify`: what is kept aside is not used, and not verified",
+                "leave one of them out",
             ),
             (true, false) if !is_calibration => {
                 refused("`aside` is for calibrations", "leave it out")

@@ -103,34 +103,22 @@ impl Desk {
     }
 }
 
-/// What only other kinds have a use for.
+/// What goes along, or says how, and is for other kinds. Other options are refused by whoever has no use for them.
 fn refuse_what_is_of_others(request: &RunRequest) -> Result<(), Problem> {
     let is_path = matches!(request.kind, RunKind::Path | RunKind::FirstPart);
     let is_job = request.kind == RunKind::Job;
-    let is_calibration = request.kind == RunKind::Calibrate;
     let given = [
         ("path", "path", request.path.is_some() && !is_path),
         ("join", "path", request.join.is_some() && !is_path),
         ("job", "job", request.job.is_some() && !is_job),
         ("beyond", "job", request.beyond && !is_job),
         ("resume", "job", request.resume.is_some() && !is_job),
-        ("aside", "calibrate", request.aside && !is_calibration),
-        ("verify", "calibrate", request.verify && !is_calibration),
     ];
     let Some((option, kind, _)) = given.into_iter().find(|it| it.2) else {
-        return refuse_both(request);
+        return Ok(());
     };
     let what = format!("`{option}` is for runs of the kind `{kind}`");
     Err(Problem::new(Code::Refused, what, "leave it out"))
-}
-
-/// What is not used is not verified.
-fn refuse_both(request: &RunRequest) -> Result<(), Problem> {
-    if !(request.aside && request.verify) {
-        return Ok(());
-    }
-    let what = "`aside` together with `verify`: what is kept aside is not verified";
-    Err(Problem::new(Code::Refused, what, "leave one of them out"))
 }
 
 /// What joins the rows, where it is said beside them.
