@@ -2,6 +2,7 @@
 
 mod aside;
 mod calibrations;
+mod groups;
 mod jobs;
 mod jogs;
 mod kinds;

@@ -28,7 +28,7 @@ pub struct PlantConfig {
     pub platform: Option<PlatformConfig>,
     /// A stage with a motor on either side in place of the stage.
     pub gantry: Option<GantryConfig>,
-    /// A rotary table in place of the stage.
+    /// A rotary table in place of the stage, or beside three axes: then its drive's axis is number 3.
     pub table: Option<TableConfig>,
     /// Three linear axes in place of the stage.
     pub volumetric: Option<VolumetricConfig>,
@@ -43,13 +43,13 @@ pub struct PlantConfig {
 }
 
 impl PlantConfig {
-    /// What stands in place of the stage, of each kind.
+    /// What stands in place of the stage, of each kind; their axes are numbered in this order.
     pub(super) fn others(&self) -> [Option<&dyn Section>; 4] {
         [
             self.gantry.as_ref().map(|it| it as &dyn Section),
             self.platform.as_ref().map(|it| it as &dyn Section),
-            self.table.as_ref().map(|it| it as &dyn Section),
             self.volumetric.as_ref().map(|it| it as &dyn Section),
+            self.table.as_ref().map(|it| it as &dyn Section),
         ]
     }
 
@@ -83,16 +83,17 @@ impl PlantConfig {
         }
     }
 
-    /// A machine is one thing or the other.
+    /// A machine is one thing or the other; only a table stands beside three axes.
     fn is_one_machine(&self) -> Result<(), ConfigError> {
         let others = self.others().into_iter().flatten().count();
-        if others <= 1 {
+        let is_beside = self.table.is_some() && self.volumetric.is_some();
+        if others <= 1 + usize::from(is_beside) {
             return Ok(());
         }
         Err(ConfigError::Value {
             key: "gantry and platform and table and volumetric",
             seen: others as f64,
-            expected: "at most one of them",
+            expected: "at most one of them, or a table beside volumetric",
         })
     }
 }

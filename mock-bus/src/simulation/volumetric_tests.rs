@@ -257,7 +257,7 @@ fn what_no_machine_can_be_is_refused() {
         ("[24, 25, 26,", "[24, 25, 26, 26,", "plant_channels"),
         (
             "[plant.volumetric]",
-            "[plant.table]\n[plant.volumetric]",
+            "[plant.gantry]\n[plant.volumetric]",
             "volumetric",
         ),
         ("sum_v = 8.0", "sum_v = 0.0", "sum_v"),

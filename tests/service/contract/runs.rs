@@ -5,12 +5,13 @@ use std::path::Path;
 
 use mock_bus::fault::Fault;
 use service::{
-    AxisState, Code, MachineState, MotionState, RunKind, RunRequest, RunState, StopMode,
+    AxisState, Caller, Code, LeaseRequest, MachineState, MotionState, RunKind, RunRequest,
+    RunState, StopMode,
 };
 use tests::{Edit, LINEAR};
 
 use super::{
-    Bed, SEED, anna, bert, compensated, each, patient, with_stage, with_zeroed_stage, zeroed,
+    Bed, SEED, anna, bert, compensated, each, patient, to, with_stage, with_zeroed_stage, zeroed,
 };
 use crate::client::PATIENCE;
 use crate::stage::Stage;
@@ -173,11 +174,67 @@ fn a_run_that_is_aborted_before_it_begins_never_moves() {
             ..RunRequest::of(RunKind::Zero, None)
         };
         let id = bed.client.plan(&anna(), &plan).unwrap();
+        // What is only planned has no axis.
+        let moved = bed.begin(&to("x", 2.0));
+        assert_eq!(bed.ended(&moved).state, MotionState::Done);
+        let before = bed.client.machine().newest_event;
         bed.client.abort(&bert(), &id).unwrap();
         let run = bed.client.run(&id, PATIENCE).unwrap();
-        assert_eq!(run.state, RunState::Stopped);
-        let problem = bed.client.start(&anna(), &id).unwrap_err();
-        assert_eq!(problem.code, Code::RunState);
-        assert!(bed.client.axis("x").unwrap().homed, "nothing was done");
+        assert_eq!((run.state, run.steps_done), (RunState::Stopped, 0));
+        assert_eq!(run.stopped.as_ref().unwrap().by, "bert");
+        assert_eq!((&run.cause, &run.journal), (&None, &None));
+        let told = bed.client.events(before);
+        let [told] = &told[..] else {
+            panic!("an end, and nothing that moved: {told:?}");
+        };
+        assert_eq!((told.kind.as_str(), told.of.as_str()), ("run", &*id));
+        assert_eq!(told.data["state"], "stopped");
+        assert_eq!(told.data["stopped"]["by"], "bert");
+        // A level: nobody ends it otherwise, or goes on with it.
+        bed.client.abort(&anna(), &id).unwrap();
+        let after = [
+            bed.client.start(&anna(), &id),
+            bed.client.pause(&anna(), &id),
+            bed.client.resume(&anna(), &id),
+        ];
+        for refused in after {
+            assert_eq!(refused.unwrap_err().code, Code::RunState);
+        }
+        assert_eq!(bed.client.run(&id, Duration::ZERO).unwrap(), run);
+        let axis = bed.client.axis("x").unwrap();
+        assert!(axis.homed, "nothing was done");
+        assert_eq!((axis.state, axis.used_by), (AxisState::Standstill, None));
+    });
+}
+
+#[test]
+fn only_the_holder_of_the_lease_ends_what_is_planned() {
+    with_zeroed_stage(|bed| {
+        let plan = RunRequest {
+            start: false,
+            ..RunRequest::of(RunKind::Zero, None)
+        };
+        let id = bed.client.plan(&bert(), &plan).unwrap();
+        let asked = LeaseRequest {
+            name: "anna".into(),
+            seconds: 3600,
+            force: false,
+        };
+        let leased = bed.client.lease(&anna(), &asked).unwrap();
+        let refused = bed.client.abort(&bert(), &id).unwrap_err();
+        assert_eq!(refused.code, Code::Leased, "{refused}");
+        let planned = bed.client.run(&id, Duration::ZERO).unwrap();
+        assert_eq!(planned.state, RunState::Planned);
+        let holder = Caller {
+            lease: Some(leased.token),
+            ..anna()
+        };
+        bed.client.abort(&holder, &id).unwrap();
+        let run = bed.client.run(&id, Duration::ZERO).unwrap();
+        assert_eq!(run.stopped.expect("she did").by, "anna");
+        // The lease is hers still.
+        let refused = bed.client.begin(&bert(), &to("x", 1.0), None).unwrap_err();
+        assert_eq!(refused.code, Code::Leased, "{refused}");
+        bed.client.release(&holder).unwrap();
     });
 }
