@@ -32,9 +32,9 @@ SHORTER = (("runs = 3", "runs = 2"), ("targets = 8\nruns = 5", "targets = 4\nrun
 PATIENT = (re.compile(r"move_timeout_s = [0-9.]+"), "move_timeout_s = 100000.0")
 
 
-def edited(text, machine):
+def edited(text, machine, changes):
     """The configuration of a machine as it is kept; a change that finds nothing would prove nothing."""
-    for old, new in SHORTER if machine == "linear" else ():
+    for old, new in (*(SHORTER if machine == "linear" else ()), *changes):
         if old not in text:
             raise RuntimeError(f"configs/machines/{machine}.toml: expected `{old}`, it is not there")
         text = text.replace(old, new)
@@ -44,8 +44,9 @@ def edited(text, machine):
 class KeptMachine:
     """Two processes and their folder."""
 
-    def __init__(self, programs, machine="linear", seed=51, is_real_time=False):
+    def __init__(self, programs, machine="linear", seed=51, is_real_time=False, changes=()):
         self.programs = Path(programs).resolve()
+        self.changes = changes
         self.machine = machine
         self.seed = seed
         self.is_real_time = is_real_time
@@ -132,7 +133,7 @@ class KeptMachine:
 
     def _serve(self, ports):
         text = (CONFIGS / "machines" / f"{self.machine}.toml").read_text()
-        (self.path / "machine.toml").write_text(edited(text, self.machine))
+        (self.path / "machine.toml").write_text(edited(text, self.machine, self.changes))
         self.words = [] if self.is_real_time else ["--clock", "lockstep:clock"]
         for name, place in ports.items():
             self.words += ["--port", f"{name}={place}"]

@@ -1,6 +1,6 @@
 //! A person at the service's page, in a browser that nobody here has written.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use tests::{Rig, rigs};
 
 use crate::http::programs;
@@ -12,6 +12,25 @@ pub(crate) const BROWSER: &str = "chromium";
 pub(crate) fn has_browser() -> bool {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&folders).any(|it| it.join(BROWSER).is_file())
+}
+
+/// From a file, in which a slip is named first; along x and then along y.
+fn follows_a_path_of_three_axes(path: &Value) {
+    assert_eq!(path["zeroed"], true, "{path}");
+    let said = |name: &str, part: &str| {
+        let text = path[name].as_str().expect("what the page says");
+        assert!(text.contains(part), "`{part}` is not in {name}: {path}");
+    };
+    said("slip", "line 3, column x_mm");
+    // Four seconds of periods of 60 ms, and the last row itself.
+    said("planned", "68 points");
+    said("planned", "4 s at least");
+    let stood = path["ended"].as_array().expect("where each axis is");
+    let stood = stood.iter().map(|it| it.as_f64().expect("in millimetres"));
+    for (axis, (mm, expected)) in stood.zip([9.0, 9.0, 5.0]).enumerate() {
+        assert!((mm - expected).abs() < 0.01, "axis {axis}: {path}");
+    }
+    assert_eq!(path["errors"], json!([]), "{path}");
 }
 
 #[test]
@@ -30,6 +49,7 @@ fn a_person_at_the_page_takes_a_machine_through_its_cycle_and_through_a_lost_con
         assert_eq!(report[step], true, "{step}: {report}");
     }
     assert_eq!(report["job"], true, "{report}");
+    follows_a_path_of_three_axes(&report["path"]);
     for look in ["1100_light", "1100_dark", "360_light", "360_dark"] {
         assert_eq!(report["looks"][look], true, "{look}: {report}");
     }

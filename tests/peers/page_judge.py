@@ -1,5 +1,6 @@
-"""A person at the page of `truestage serve`, in headless Chromium: zero, calibrate, move, a job that is pasted and answered,
-a lost connection, verify; what is drawn, in a narrow window, in the dark and by keyboard.
+"""A person at the page of `truestage serve`, in headless Chromium: zero, calibrate, move, a job that is read from a file and
+answered, a lost connection, verify; what is drawn, in a narrow window, in the dark and by keyboard. Then three axes, which follow a
+path from a file.
 
     page_judge.py PROGRAMS CHROMIUM
 
@@ -35,6 +36,16 @@ go_on = { operator = "lay a part on the stage" }
 [[point]]
 position_mm = 12.5
 """
+PATH = "time_s,x_mm,y_mm,z_mm\n0,5,5,5\n2,9,5,5\n4,9,9,5\n"
+# Three axes with rare SYNCs: how well they follow is judged elsewhere.
+RARE_SYNCS = (
+    ("sync_period_ms = 2.0", "sync_period_ms = 60.0"),
+    ("every_syncs = 10", "every_syncs = 1"),
+    ("age_max_ms = 100.0", "age_max_ms = 2000.0"),
+    ("following_error_timeout_ms = 20", "following_error_timeout_ms = 2000"),
+    ("following_error_limit_um = 500.0", "following_error_limit_um = 50000.0"),
+    ("deviation_limit_um = 500.0", "deviation_limit_um = 50000.0"),
+)
 # Where pictures of the page go, for people who want to look at them.
 SHOTS = os.environ.get("TRUESTAGE_SHOTS")
 
@@ -107,13 +118,7 @@ class Person:
         self.take_control()
         before = self.browser.value(f"{NEWEST}?.id || ''")
         read_only = self.browser.value("document.getElementById('along').hidden")
-        self.browser.value(
-            "(() => { const kind = document.getElementById('kind'); kind.value = 'job';"
-            " kind.dispatchEvent(new Event('change')); const files = new DataTransfer();"
-            f" files.items.add(new File([{json.dumps(JOB)}], 'job.toml')); const file = document.getElementById('file');"
-            " file.files = files.files; file.dispatchEvent(new Event('change')); })()"
-        )
-        self.browser.wait_for("the text of the file", "document.getElementById('rows').value.includes('lay a part')")
+        self._read("job", "job.toml", JOB)
         self.browser.value("document.querySelector('#plan > button').click()")
         self.browser.wait_for("the plan of a job", f"({NEWEST}?.id || '') !== '{before}'")
         planned = self.browser.wait_for("what is asked", f"{NEWEST}.innerText.includes('A person is asked') && {NEWEST}.innerText")
@@ -128,6 +133,40 @@ class Person:
         self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('points before')")
         self.pace.slow = True
         return read_only and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
+
+    def path(self):
+        """Reads a path from a file, with a slip first, plans it and follows it; what the page says of it."""
+        self._plan_path(PATH.replace("2,9,", "2,9O,"))
+        problem = "document.getElementById('problem').textContent"
+        slip = self.browser.wait_for("what is wrong with the path", f"{problem}.includes('`9O`') && {problem}")
+        before = self.browser.value(f"{NEWEST}?.id || ''")
+        self._plan_path(PATH)
+        self.browser.wait_for("the plan of a path", f"({NEWEST}?.id || '') !== '{before}'")
+        joins = f"{NEWEST}.innerText.includes('the straight joins of its rows') && {NEWEST}.innerText"
+        planned = self.browser.wait_for("where it leaves its rows", joins)
+        self.take_control()
+        self._press("Start")
+        self.pace.slow = False
+        self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('\\ndone\\n')")
+        self.pace.slow = True
+        place = "[...document.querySelectorAll('#axes .position')].map((it) => parseFloat(it.textContent))"
+        return {"slip": slip, "planned": planned, "ended": self.browser.value(place)}
+
+    def _plan_path(self, rows):
+        self.take_control()
+        self._read("path", "path.csv", rows)
+        self.browser.value("document.getElementById('uncompensated').checked = true")
+        self.browser.value("document.querySelector('#plan > button').click()")
+
+    def _read(self, kind, name, text):
+        """Chooses what is run, and a file for it."""
+        self.browser.value(
+            f"(() => {{ const kind = document.getElementById('kind'); kind.value = '{kind}';"
+            " kind.dispatchEvent(new Event('change')); const files = new DataTransfer();"
+            f" files.items.add(new File([{json.dumps(text)}], '{name}')); const file = document.getElementById('file');"
+            " file.files = files.files; file.dispatchEvent(new Event('change')); })()"
+        )
+        self.browser.wait_for("the text of the file", f"document.getElementById('rows').value === {json.dumps(text)}")
 
     def _press(self, text):
         button = f"[...{NEWEST}.querySelectorAll('button')].find((it) => it.textContent === '{text}')"
@@ -225,11 +264,29 @@ def commanded(kept, browser):
     return report
 
 
+def followed(kept, browser):
+    """Three axes follow a path; a report."""
+    pace = Pace(kept.clock)
+    person = Person(browser, pace)
+    browser.open(kept.url + "/")
+    browser.wait_for("the machine", "document.getElementById('state').textContent === 'running'")
+    report = {"zeroed": "done" in person.run("zero"), **person.path()}
+    # The slip was refused, which a browser logs.
+    report["errors"] = [it for it in browser.errors if "422" not in it]
+    pace.end()
+    return report
+
+
 def main():
     programs, chromium = sys.argv[1:]
-    with KeptMachine(programs) as kept, Browser(chromium) as browser:
-        report = commanded(kept, browser)
-        wait_for("the service", lambda: kept.ask("GET", "/v1/machine")["state"] == "running")
+    with Browser(chromium) as browser:
+        with KeptMachine(programs) as kept:
+            report = commanded(kept, browser)
+            wait_for("the service", lambda: kept.ask("GET", "/v1/machine")["state"] == "running")
+            browser.open("about:blank")
+        browser.errors.clear()
+        with KeptMachine(programs, "volumetric", changes=RARE_SYNCS) as kept:
+            report["path"] = followed(kept, browser)
         print(json.dumps(report))
 
 
