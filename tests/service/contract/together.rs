@@ -462,8 +462,8 @@ fn plans_tables(bed: &Bed<'_>) -> RunPlanView {
     planned.plan
 }
 
-fn follows_paths(bed: &Bed<'_>) {
-    let before = bed.encoder_mm("x");
+/// Paths that cannot be followed, each with its reason.
+fn refuses_paths(bed: &Bed<'_>) {
     let refused = |request: &RunRequest, code: Code, words: &[&str]| {
         let problem = bed.client.plan(&anna(), request).unwrap_err();
         assert_eq!(problem.code, code, "{problem:?}");
@@ -505,7 +505,11 @@ fn follows_paths(bed: &Bed<'_>) {
         ..slip
     };
     refused(&other, Code::Refused, &["`path`"]);
+}
 
+fn follows_paths(bed: &Bed<'_>) {
+    let before = bed.encoder_mm("x");
+    refuses_paths(bed);
     let of_table = plans_tables(bed);
 
     // A corner, which a spline does not turn straight.

@@ -272,7 +272,7 @@ fn a_run_that_goes_on_warms_up_again_where_less_than_four_fifths_of_the_warmth_a
     assert!(warm.len() > 3, "{warm:?}");
 
     // By the machine's clock, until the person goes home before that line.
-    let mut goes_on_to = |volume: &mut Volume, line: usize| {
+    let goes_on_to = |volume: &mut Volume, line: usize| {
         let begun = volume.bench.machine.now();
         let (left, _) = calibrate_by(volume, warm_up, Some(&path), Some(line));
         let left = left.unwrap_err();
