@@ -8,6 +8,7 @@ use nix::pty::openpty;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+use tests::json_schema::check_output;
 use tests::{Edit, Rig, with_emulated_spot_cameras, with_spot_cameras};
 
 use crate::programs::{live_rigs, number, text};
@@ -65,8 +66,11 @@ fn ended(mut running: Running) -> (String, Option<i32>) {
 
 fn objects(printed: &str) -> Vec<Value> {
     let each = printed.lines().map(serde_json::from_str);
-    each.collect::<Result<_, _>>()
-        .unwrap_or_else(|error| panic!("{error}: {printed}"))
+    let all: Vec<Value> = each
+        .collect::<Result<_, _>>()
+        .unwrap_or_else(|error| panic!("{error}: {printed}"));
+    all.iter().for_each(check_output);
+    all
 }
 
 fn detector<'a>(seen: &'a Value, name: &str) -> &'a Value {

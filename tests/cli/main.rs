@@ -22,6 +22,7 @@ mod platform;
 mod programs;
 mod rotary;
 mod samples;
+mod schema;
 mod screw;
 mod serve;
 mod serve_kinds;

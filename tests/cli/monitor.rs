@@ -5,6 +5,7 @@ use std::process::{Child, Command, Stdio};
 
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
+use tests::json_schema::check_output;
 
 use crate::programs::{Bench, live_rigs, program};
 use crate::serve::{ask, keep};
@@ -37,6 +38,7 @@ fn every_event_is_a_line_from_the_first_one_on_until_the_service_ends() {
                 .expect("a stop comes")
                 .expect("a program prints text");
             let event: Value = serde_json::from_str(&line).expect("an object a line");
+            check_output(&event);
             ids.push(event["id"].as_u64().expect("a number"));
             if event["kind"] == "stop" {
                 assert_eq!(event["data"]["mode"], "controlled", "{event}");

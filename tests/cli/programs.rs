@@ -15,6 +15,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+use tests::json_schema::check_output;
 use tests::{Edit, INTERFACE, LINEAR, Rig, Shipped, rigs};
 
 /// The clock that a machine and its controllers share, beside the machine's other files.
@@ -152,6 +153,9 @@ impl Ended {
             let parsed = serde_json::from_str(&text);
             parsed.unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
         };
+        if !json.is_null() {
+            check_output(&json);
+        }
         Self {
             code: output.status.code(),
             json,

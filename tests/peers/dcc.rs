@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use tests::json_schema::check_output;
 use tests::{Edit, LINEAR, ROTARY, left_out, random};
 
 use crate::peer::{Peer, can_import};
@@ -63,7 +64,9 @@ pub(crate) fn truestage(folder: &Path, words: &[&str]) -> Value {
         "{words:?}: {}",
         String::from_utf8_lossy(&ended.stderr)
     );
-    serde_json::from_slice(&ended.stdout).expect("one JSON object")
+    let printed = serde_json::from_slice(&ended.stdout).expect("one JSON object");
+    check_output(&printed);
+    printed
 }
 
 /// Columns of one or both approaches, with uncertainties.

@@ -1,6 +1,7 @@
 //! Software of others on the same bus: python-canopen as the master of our emulated devices and
 //! as our driver's server, python-can as the reader of our recordings; GTC, which computes uncertainties; and
 //! lxml, which judges certificates by the schema of the PTB; DuckDB and the library of MCAP, which read exported journals;
+//! jsonschema-rs, which judges what `--json` prints;
 //! schemathesis and openapi-python-client, which judge the HTTP interface, and Chromium, which shows its
 //! page and draws pictures of others.
 
@@ -17,6 +18,7 @@ mod page;
 mod peer;
 mod pictures;
 mod recording;
+mod schema;
 
 use tests::Rig;
 

@@ -15,6 +15,7 @@ mod four_screws;
 mod group;
 mod hand;
 mod interface;
+pub mod json_schema;
 mod line_signal;
 mod many;
 mod not_run;

@@ -16,6 +16,7 @@ const DOCUMENTS: &[&str] = &[
     "docs/dependencies.md",
     "docs/engine.md",
     "docs/glossary.md",
+    "docs/json.md",
     "docs/lockstep.md",
     "docs/safety.md",
     "docs/seeds.md",

@@ -35,7 +35,7 @@ pub(super) fn inline_of<C: JsonSchema>() -> Value {
 }
 
 /// The schema as editors take it, each part once.
-#[cfg(test)]
+#[cfg(any(test, feature = "program"))]
 pub(crate) fn schema() -> Value {
     settings_of::<MachineConfig>(false)
 }

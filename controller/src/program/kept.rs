@@ -445,7 +445,7 @@ fn words_of(ended: &Value) -> (String, Value) {
     let told = &ended["told"];
     match told["text"].as_str() {
         Some(text) => (plain(text), told["value"].clone()),
-        None => ("done".into(), ended["result"].clone()),
+        None => ("done".into(), json!({"result": ended["result"]})),
     }
 }
 

@@ -33,6 +33,7 @@ mod output;
 mod page;
 mod platform;
 mod progress;
+mod refused;
 mod report;
 mod reset;
 mod resume;
@@ -41,6 +42,7 @@ mod run;
 #[cfg(test)]
 mod same_figures_tests;
 mod scan;
+mod schema;
 mod secure;
 mod serve;
 mod session;
@@ -65,8 +67,10 @@ use wire::lockstep::path_of;
 use crate::ports::Pace;
 use crate::{Agreed, Failure, made_by};
 use intended::Intent;
-use output::Output;
+use output::{Ended, Output};
+use refused::not_understood;
 use rotary::readings::ReadingsArgs;
+use schema::verb_of;
 use volumetric::memory_args::MemoryCommand;
 
 /// What a shell script learns of an end: [`crate::Failure::exit_code`].
@@ -153,7 +157,7 @@ enum Command {
     /// Say what a code means, what it mostly comes from and what to do: `truestage explain 0x8611`.
     Explain(explain::ExplainArgs),
     /// Keep the machine zeroed, enabled and supervised, and let others ask for motions and runs over HTTP.
-    Serve(ServeArgs),
+    Serve(serve::ServeArgs),
     /// One more who may ask a service over the network: prints a token once, and keeps its hash in a file.
     Token(token::TokenArgs),
     /// What a machine that is kept by a service does, and its axes.
@@ -173,6 +177,9 @@ enum Command {
     Journal(journal::JournalCommand),
     /// A self-contained HTML page of a run.
     Report(report::ReportArgs),
+    /// The JSON Schemas of what this program prints and reads.
+    #[command(subcommand)]
+    Schema(schema::SchemaCommand),
     /// A script by which a shell completes the words of this program: for bash,
     /// `truestage completions bash > ~/.local/share/bash-completion/completions/truestage`.
     Completions(shell::CompletionsArgs),
@@ -395,22 +402,8 @@ fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failu
     }
 }
 
-use serve::Network;
 pub use serve::Serving;
 use token::NewToken;
-
-/// A machine that is kept, and where it is found.
-#[derive(Clone, Debug, Args)]
-struct ServeArgs {
-    #[command(flatten)]
-    machine: MachineArgs,
-    /// Where: `unix:PATH` (mode 0660), `tcp:127.0.0.1:PORT` for everybody on this computer, or `tls:ADDRESS:PORT` for
-    /// the network, with --tls-cert, --tls-key and --tokens. May be given several times.
-    #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
-    listen: Vec<String>,
-    #[command(flatten)]
-    network: Network,
-}
 
 /// A service that keeps a machine.
 #[derive(Clone, Debug, Args)]
@@ -428,10 +421,35 @@ pub fn main(
     version: &'static str,
 ) -> ExitCode {
     made_by::this_is(version);
-    let words = Cli::command().version(version).get_matches();
-    let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
-    let output = Output::new(cli.json);
-    let result = match cli.command {
+    let words = Cli::command().version(version).try_get_matches();
+    let read = words.and_then(|words| Ok((verb_of(&words), Cli::from_arg_matches(&words)?)));
+    let (verb, cli) = match read {
+        Ok(read) => read,
+        Err(refused) => return not_understood(&refused),
+    };
+    // As long as the program: there is one.
+    let output = Output::new(cli.json, verb.leak());
+    match done(cli.command, output, keep, enrol) {
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(failure)) => {
+            output.note(&format!("error: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
+        Err(failure) => {
+            output.failure(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+/// Does what `command` says.
+fn done(
+    command: Command,
+    output: Output,
+    keep: fn(Serving) -> Result<(), Failure>,
+    enrol: fn(NewToken) -> Result<String, Failure>,
+) -> Ended {
+    match command {
         Command::Demo(args) => demo::run(&args, output),
         Command::Check { config } => check::run(&config, output),
         Command::New(args) => new::run(&args, output),
@@ -472,19 +490,9 @@ pub fn main(
         Command::Token(args) => token::run(args, output, enrol),
         Command::Journal(command) => journal::run(&command, output),
         Command::Report(args) => report::run(&args, output),
+        Command::Schema(command) => schema::run(command, &Cli::command(), output),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(&args, Cli::command(), output),
-    };
-    match result {
-        Ok(None) => ExitCode::SUCCESS,
-        Ok(Some(failure)) => {
-            output.note(&format!("error: {failure}"));
-            ExitCode::from(failure.exit_code())
-        }
-        Err(failure) => {
-            output.failure(&failure);
-            ExitCode::from(failure.exit_code())
-        }
     }
 }
 

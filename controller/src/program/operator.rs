@@ -379,7 +379,7 @@ mod tests {
         let pty = openpty(None, None).unwrap();
         let mut keyboard = File::from(pty.master);
         let answers = Answers::Keyboard(File::from(pty.slave));
-        let mut terminal = Terminal::over(answers, Output::new(true), true);
+        let mut terminal = Terminal::over(answers, Output::new(true, "test"), true);
         let task = PlateTask {
             axis: "c".into(),
             plate: "A7".into(),
@@ -410,7 +410,7 @@ mod tests {
         let pty = openpty(None, None).unwrap();
         let mut keyboard = File::from(pty.master);
         let answers = Answers::Keyboard(File::from(pty.slave));
-        let mut terminal = Terminal::over(answers, Output::new(true), false);
+        let mut terminal = Terminal::over(answers, Output::new(true, "test"), false);
         let question = |turns| Question {
             asked: Asked::Close,
             text: "close?".into(),

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::Failure;
 use crate::config::ConfigError;
@@ -19,15 +19,24 @@ pub(crate) fn with_counters(mut value: Value, counters: Value) -> Value {
     value
 }
 
+/// The version of the schema that every object of `--json` keeps to (docs/json.md): members are added within a version,
+/// and none is renamed, taken away or given another meaning.
+pub(crate) const SCHEMA: u32 = 1;
+
+/// What stands for the verb where the words of the command line name none that can be run.
+pub(crate) const NO_VERB: &str = "";
+
 /// How results are printed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
     json: bool,
+    /// Whose, in full: `cal list`.
+    verb: &'static str,
 }
 
 impl Output {
-    pub(crate) const fn new(json: bool) -> Self {
-        Self { json }
+    pub(crate) const fn new(json: bool, verb: &'static str) -> Self {
+        Self { json, verb }
     }
 
     pub(crate) const fn is_json(self) -> bool {
@@ -58,7 +67,7 @@ impl Output {
 
     fn print(self, text: &str, value: &Value) {
         let line = if self.json {
-            value.to_string()
+            self.object(value)
         } else {
             text.to_owned()
         };
@@ -67,10 +76,29 @@ impl Output {
         let _ = writeln!(std::io::stdout().lock(), "{line}");
     }
 
+    /// `value` in one line, as everything is that `--json` prints: it says which version of the schema it keeps to, and
+    /// whose it is.
+    pub(crate) fn object(self, value: &Value) -> String {
+        let mut members = match value {
+            Value::Object(members) => members.clone(),
+            Value::Null => Map::new(),
+            // Of a service, whose answers are not known here.
+            other => Map::from_iter([("result".to_owned(), other.clone())]),
+        };
+        members.insert("schema".into(), json!(SCHEMA));
+        members.insert("verb".into(), json!(self.verb));
+        Value::Object(members).to_string()
+    }
+
     /// What happens meanwhile, for people; on stderr so that stdout stays one object.
     pub(crate) fn note(self, text: &str) {
         progress::settle();
         let _ = writeln!(std::io::stderr().lock(), "{text}");
+    }
+
+    /// Why the command line was refused, for programs.
+    pub(crate) fn refused(self, why: &str, exit_code: u8) {
+        self.print("", &json!({"error": why, "exit_code": exit_code}));
     }
 
     /// Why there is no result.
@@ -83,5 +111,23 @@ impl Output {
             self.print("", &error);
         }
         self.note(&format!("error: {failure}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_object_says_its_version_and_its_verb() {
+        let output = Output::new(true, "cal list");
+        let of = |value: Value| -> Value {
+            serde_json::from_str(&output.object(&value)).expect("it is JSON")
+        };
+        let expected = json!({"schema": 1, "verb": "cal list", "a": 2});
+        assert_eq!(of(json!({"a": 2})), expected);
+        let empty = json!({"schema": 1, "verb": "cal list"});
+        assert_eq!(of(Value::Null), empty);
+        assert_eq!(of(json!([1]))["result"], json!([1]));
     }
 }

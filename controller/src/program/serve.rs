@@ -10,7 +10,7 @@ use crate::program::kind::KINDS;
 use crate::program::output::{Ended, Output};
 use crate::program::report::html;
 use crate::program::session::Session;
-use crate::program::{ServeArgs, json};
+use crate::program::{MachineArgs, json};
 use crate::runs::Teller;
 use crate::{Failure, Machine};
 use machine::records::{Lease, Store};
@@ -35,6 +35,19 @@ pub struct Serving {
     pub announce: Box<Announcing>,
     /// Tells whoever started it something.
     pub told: Box<dyn Fn(&str)>,
+}
+
+/// A machine that is kept, and where it is found.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct ServeArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Where: `unix:PATH` (mode 0660), `tcp:127.0.0.1:PORT` for everybody on this computer, or `tls:ADDRESS:PORT` for
+    /// the network, with --tls-cert, --tls-key and --tokens. May be given several times.
+    #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
+    listen: Vec<String>,
+    #[command(flatten)]
+    network: Network,
 }
 
 /// What opens a service to the network.

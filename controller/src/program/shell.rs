@@ -65,7 +65,7 @@ mod tests {
                 folder: folder.clone(),
             },
             Cli::command(),
-            Output::new(true),
+            Output::new(true, "test"),
         )
         .unwrap();
         for verb in Cli::command().get_subcommands().map(Command::get_name) {
@@ -81,7 +81,7 @@ mod tests {
         let nowhere = ManArgs {
             folder: folder.join("nowhere"),
         };
-        let refused = man(&nowhere, Cli::command(), Output::new(true)).unwrap_err();
+        let refused = man(&nowhere, Cli::command(), Output::new(true, "test")).unwrap_err();
         assert_eq!(refused.exit_code(), 2);
     }
 

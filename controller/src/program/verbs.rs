@@ -9,6 +9,7 @@ use super::demo::stand::Demo;
 use super::intended::{Intent, Step};
 use super::output::{Ended, Output};
 use super::page::compare::Comparison;
+use super::schema::form::Printed;
 use super::show::Shown;
 use super::targets::AskedMotion;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
@@ -38,6 +39,8 @@ pub(crate) struct Verbs {
     pub(crate) asked: &'static [Asked],
     /// What its runs and moves gave, for whoever keeps a machine: a teller of its own.
     pub(crate) words: Words,
+    /// What its verbs print for programs.
+    pub(crate) printed: fn() -> Printed,
     /// What its calibrations say.
     pub(crate) shown: &'static [Shown],
     /// By what its journals are known.

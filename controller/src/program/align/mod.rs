@@ -182,7 +182,7 @@ impl Align {
     fn show(&mut self, view: &View) {
         let text = match &mut self.shown {
             Shown::Picture(screen) => screen.draw(view),
-            Shown::Lines if self.output.is_json() => format!("{}\n", lines::value(view)),
+            Shown::Lines if self.output.is_json() => self.output.object(&lines::value(view)) + "\n",
             Shown::Lines => format!("{}\n", lines::line(view)),
         };
         let mut out = stdout().lock();

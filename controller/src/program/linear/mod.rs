@@ -9,6 +9,7 @@ pub(crate) mod job;
 mod moved;
 mod page;
 pub(crate) mod plan;
+mod printed;
 mod report;
 mod shown;
 #[cfg(test)]
@@ -48,6 +49,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     motion: axis_motion,
     asked: &[],
     words: &told::TELLER,
+    printed: printed::printed,
     shown: &[Shown::of::<LinearContent>()],
     opened_by: LinearLog::OPENED_BY,
     page: page::html,

@@ -74,7 +74,7 @@ fn lines(heard: &Receiver<Heard>, until: Instant, output: Output) -> Ended {
     loop {
         let left = until.saturating_duration_since(Instant::now());
         let line = match heard.recv_timeout(left) {
-            Ok(Heard::Event(event)) if output.is_json() => event.to_string(),
+            Ok(Heard::Event(event)) if output.is_json() => output.object(&event),
             Ok(Heard::Event(event)) => words::line(&event),
             Ok(Heard::Lost(failure)) => return Err(failure),
             Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => {

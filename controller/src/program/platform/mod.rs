@@ -6,6 +6,7 @@ pub(crate) mod fit;
 mod intended;
 mod json;
 pub(crate) mod plan;
+mod printed;
 mod report;
 #[cfg(test)]
 mod stored_tests;
@@ -39,6 +40,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     motion: target::motion,
     asked: &[],
     words: &told::TELLER,
+    printed: printed::printed,
     shown: &[Shown::of::<ScrewContent>()],
     opened_by: PlatformLog::OPENED_BY,
     page: html,

@@ -6,6 +6,7 @@ pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
 mod json;
+mod printed;
 pub(crate) mod readings;
 mod report;
 mod residuals;
@@ -47,6 +48,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     motion: targets::motion,
     asked: asked::ASKED,
     words: &told::TELLER,
+    printed: printed::printed,
     shown: &[Shown::of::<RotaryContent>()],
     opened_by: PlateLog::OPENED_BY,
     page: html,

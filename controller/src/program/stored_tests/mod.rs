@@ -191,7 +191,7 @@ fn show_calibration(desk: &Desk, base: &str, id: &str, run: &Path) -> Result<Str
     let store = &desk.store;
     let list = cal::listed(store)?.0;
     let text = cal::shown(store, id)?.0;
-    let diff = cal::compared(store, base, id, Output::new(true));
+    let diff = cal::compared(store, base, id, Output::new(true, "test"));
     let diff = diff.map_or_else(|it| it.to_string(), |it| it.0);
     Ok([list, text, diff, report::html(run)?].concat())
 }

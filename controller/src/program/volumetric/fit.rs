@@ -367,7 +367,7 @@ mod tests {
                 without: Vec::new(),
                 save: true,
             };
-            fit(&args, Output::new(true))
+            fit(&args, Output::new(true, "test"))
         }
     }
 

@@ -8,6 +8,7 @@ mod intended;
 pub(crate) mod memory_args;
 pub(crate) mod moved;
 pub(crate) mod part;
+mod printed;
 pub(crate) mod reference;
 mod report;
 pub(crate) mod shown;
@@ -44,6 +45,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     motion,
     asked: asked::ASKED,
     words: &told::TELLER,
+    printed: printed::printed,
     shown: &[
         Shown::of::<GeometryContent>(),
         Shown::of::<BeamReferencesContent>(),

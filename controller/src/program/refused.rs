@@ -1,0 +1,24 @@
+//! A command line that is not understood.
+
+use std::process::ExitCode;
+
+use super::output::{NO_VERB, Output};
+
+/// What such a command line ends with.
+const USAGE: u8 = 2;
+
+/// Help that was asked for, or words that were refused: with `--json` these are an object like every failure.
+pub(super) fn not_understood(refused: &clap::Error) -> ExitCode {
+    let wants_json = || std::env::args_os().any(|it| it == "--json");
+    if refused.use_stderr() && wants_json() {
+        let why = refused.to_string();
+        let why = why.strip_prefix("error: ").unwrap_or(&why);
+        Output::new(true, NO_VERB).refused(why.trim_end(), USAGE);
+    }
+    // A closed pipe is the reader's right.
+    let _ = refused.print();
+    match refused.use_stderr() {
+        true => ExitCode::from(USAGE),
+        false => ExitCode::SUCCESS,
+    }
+}

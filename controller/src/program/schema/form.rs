@@ -1,0 +1,76 @@
+//! What a verb prints: one form, or several where it depends on the machine or on what was asked.
+
+use super::shape::{Member, Shape, by_name, part, text, whole};
+
+/// One form of what a verb prints.
+#[derive(Clone, Debug)]
+pub(crate) struct Form {
+    /// The verb in full: `cal list`.
+    pub(crate) verb: &'static str,
+    /// Of what, or when.
+    pub(crate) what: &'static str,
+    pub(crate) members: Vec<Member>,
+    /// Whether a failure may stand beside the result.
+    pub(crate) is_judged: bool,
+}
+
+impl Form {
+    pub(crate) fn new(
+        verb: &'static str,
+        what: &'static str,
+        members: impl IntoIterator<Item = Member>,
+    ) -> Self {
+        Self {
+            verb,
+            what,
+            members: members.into_iter().collect(),
+            is_judged: false,
+        }
+    }
+
+    /// With what the devices counted, where this program had the machine itself.
+    pub(crate) fn counted(mut self) -> Self {
+        self.members.push(("counters?", part("counters")));
+        self
+    }
+
+    /// The result may be a bad one: then the failure is beside it.
+    pub(crate) fn judged(mut self) -> Self {
+        self.is_judged = true;
+        self
+    }
+}
+
+/// What is printed by verbs that belong together.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Printed {
+    pub(crate) forms: Vec<Form>,
+    /// What is in several of them, by its name.
+    pub(crate) parts: Vec<(&'static str, Shape)>,
+}
+
+/// The members of every failure.
+pub(super) fn failure() -> [Member; 2] {
+    let [error, exit_code] = failure_shapes();
+    [("error", error), ("exit_code", exit_code)]
+}
+
+/// The same beside a result, which need not be a bad one.
+pub(super) fn failure_beside() -> [Member; 2] {
+    let [error, exit_code] = failure_shapes();
+    [("error?", error), ("exit_code?", exit_code)]
+}
+
+fn failure_shapes() -> [Shape; 2] {
+    [
+        text().about("What went wrong, for an operator."),
+        whole().about("What the program ends with; `truestage explain CODE` says more."),
+    ]
+}
+
+/// What devices counted on the way.
+pub(super) fn counters() -> Shape {
+    by_name(by_name(whole())).about(
+        "What the devices counted on the way, by device and by what; what never happened is left out.",
+    )
+}
