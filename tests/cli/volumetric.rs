@@ -322,13 +322,14 @@ fn errors_follow_again_from_a_journal_and_from_a_file_of_its_readings() {
     fs::write(&file, &csv).expect("there is room");
     let from_file = fit(&[&["lines.csv"], &config[..]].concat()).with_code(0);
     assert_eq!(from_file["readings"], from_journal["readings"]);
-    for (a, b) in [("squareness_arcsec", 1e-4), ("squareness_u_arcsec", 1e-4)] {
-        let pairs = (0..3).map(|k| (number(&from_file[a][k]), number(&from_journal[a][k])));
-        assert!(
-            pairs.clone().all(|(x, y)| (x - y).abs() < b),
-            "{a}: {:?}",
-            pairs.collect::<Vec<_>>()
-        );
+    // What all readings share of their uncertainty a file does not say: squarenesses are as they were within a tenth of
+    // what is stated, and stated no surer.
+    for k in 0..3 {
+        let of = |fitted: &serde_json::Value, key: &str| number(&fitted[key][k]);
+        let [file, own] = [&from_file, &from_journal].map(|it| of(it, "squareness_arcsec"));
+        let [file_u, own_u] = [&from_file, &from_journal].map(|it| of(it, "squareness_u_arcsec"));
+        assert!((file - own).abs() < 0.1 * own_u, "{file}, {own}, {own_u}");
+        assert!(file_u > 0.999 * own_u, "{file_u}, {own_u}");
     }
     let unsaved = fit(&[&["lines.csv"], &config[..], &["--save"]].concat()).with_code(2);
     check_error(&unsaved, &["6", "--temperatures-c"]);

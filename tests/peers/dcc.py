@@ -44,7 +44,8 @@ def said(root):
     results = []
     for result in root.iter(DCC + "result"):
         quantities = list(result.iter(DCC + "quantity"))
-        if result.find(".//" + DCC + "list") is None:
+        # Deviations at positions; whatever else is in a list is not asked for.
+        if result.find(".//" + DCC + "list") is None or len(quantities) < 2:
             continue
         results.append(
             {

@@ -4,6 +4,14 @@ use super::Failure;
 use crate::store::StoreError;
 
 impl Failure {
+    /// Whether it says that a calibration makes the machine worse.
+    pub(crate) fn tells_worse(&self) -> bool {
+        match self {
+            Self::Kind(failure) => failure.tells_worse(),
+            other => matches!(other, Self::MadeWorse { .. }),
+        }
+    }
+
     /// Whether it is what ends a procedure that was asked to end.
     pub fn is_stop(&self) -> bool {
         match self {

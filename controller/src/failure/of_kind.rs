@@ -13,6 +13,11 @@ pub trait KindFailure: Error + Any + Send + Sync {
     fn depends_on_time(&self) -> bool {
         false
     }
+
+    /// Whether it says that a calibration makes the machine worse.
+    fn tells_worse(&self) -> bool {
+        false
+    }
 }
 
 /// The failure of some kind; it says what that one says.
@@ -26,6 +31,10 @@ impl OfKind {
 
     pub(super) fn depends_on_time(&self) -> bool {
         self.0.depends_on_time()
+    }
+
+    pub(super) fn tells_worse(&self) -> bool {
+        self.0.tells_worse()
     }
 
     pub(super) fn downcast_ref<K: KindFailure>(&self) -> Option<&K> {

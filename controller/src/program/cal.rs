@@ -13,9 +13,8 @@ use crate::program::chosen::{Used, told};
 use crate::program::controls::export::{self, ExportArgs};
 use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kept::or_by_its_service;
-use crate::program::kind::KINDS;
+use crate::program::kind::of_kind;
 use crate::program::output::{Ended, Output};
-use crate::program::show::Shown;
 use crate::runs::{Change, Choice, Group, write};
 use crate::{Failure, config};
 
@@ -158,13 +157,6 @@ pub(crate) fn shown(store: &Store, id: &str) -> Result<(String, Value), Failure>
         None => text,
     };
     Ok((text, json!({"id": id, "record": value})))
-}
-
-/// How a kind of content is shown that the store knows.
-fn of_kind(kind: &str) -> Shown {
-    let all = KINDS.iter().flat_map(|it| it.shown);
-    let own = all.into_iter().find(|it| it.kind == kind);
-    *own.expect("a test looks for each kind that is stored")
 }
 
 fn diff(store: &Store, [before, after]: [&str; 2], page: Option<&Path>, output: Output) -> Ended {

@@ -6,6 +6,7 @@ use crate::Failure;
 use crate::config::{self, MachineConfig};
 use crate::program::MachineArgs;
 use crate::program::output::Ended;
+use crate::program::show::Shown;
 
 /// Each kind.
 pub(crate) const KINDS: &[&Verbs] = &[
@@ -53,6 +54,13 @@ fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<&'static Verbs, Fai
         }
         _ => Ok(&linear::VERBS),
     }
+}
+
+/// How a kind of content is shown that the store knows.
+pub(crate) fn of_kind(kind: &str) -> Shown {
+    let all = KINDS.iter().flat_map(|it| it.shown);
+    let own = all.into_iter().find(|it| it.kind == kind);
+    *own.expect("a test looks for each kind that is stored")
 }
 
 #[cfg(test)]

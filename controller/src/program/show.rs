@@ -3,6 +3,7 @@
 use machine::records::{Content, Store};
 use serde_json::Value;
 
+use super::controls::dcc::Certifiable;
 use crate::Failure;
 
 /// Lines for people, and values for programs.
@@ -20,6 +21,21 @@ pub(crate) trait Show: Content {
     fn drawn(&self, _after: &Self) -> String {
         String::new()
     }
+
+    /// What a certificate says of `axis`.
+    ///
+    /// # Errors
+    /// When it certifies nothing, as what detectors of a machine read, or an uncertainty is not known.
+    fn certifiable(&self, _axis: &str) -> Result<Certifiable, Failure> {
+        Err(Failure::Usage {
+            what: format!(
+                "--format dcc: a record of the kind {} says what detectors of this machine read, which certifies nothing",
+                Self::KIND
+            ),
+            help: "export the calibration that it counts from; `cal list` names all, `cal show --json` prints this one"
+                .into(),
+        })
+    }
 }
 
 /// A stored calibration in lines, and as it lies in its file.
@@ -28,6 +44,8 @@ type One = fn(&Store, &str) -> Result<(String, Value), Failure>;
 type Two = fn(&Store, &str, &str) -> Result<Option<Changes>, Failure>;
 /// What two look like.
 type Drawn = fn(&Store, &str, &str) -> Result<String, Failure>;
+/// What a certificate says of one.
+type Certified = fn(&Store, &str) -> Result<Certifiable, Failure>;
 
 /// A kind of content that can be shown.
 #[derive(Clone, Copy)]
@@ -36,6 +54,7 @@ pub(crate) struct Shown {
     pub(crate) one: One,
     pub(crate) two: Two,
     pub(crate) drawn: Drawn,
+    pub(crate) certifiable: Certified,
 }
 
 impl Shown {
@@ -45,6 +64,7 @@ impl Shown {
             one: one::<C>,
             two: two::<C>,
             drawn: drawn::<C>,
+            certifiable: certifiable::<C>,
         }
     }
 }
@@ -63,4 +83,9 @@ fn two<C: Show>(store: &Store, before: &str, after: &str) -> Result<Option<Chang
 fn drawn<C: Show>(store: &Store, before: &str, after: &str) -> Result<String, Failure> {
     let (before, after) = (store.load::<C>(before)?, store.load::<C>(after)?);
     Ok(before.content.drawn(&after.content))
+}
+
+fn certifiable<C: Show>(store: &Store, id: &str) -> Result<Certifiable, Failure> {
+    let record = store.load::<C>(id)?;
+    record.content.certifiable(&record.head.axis)
 }

@@ -56,12 +56,14 @@ pub(crate) fn tried(
     }
 }
 
-/// How a verification that found nothing ended.
+/// How a verification ended that did not come to figures of a good calibration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Cut {
     /// Somebody stopped it; where what it measured is kept.
     Stopped(Option<PathBuf>),
     Failed,
+    /// It shows that the calibration makes the machine worse.
+    Worse,
 }
 
 impl Made {
@@ -74,9 +76,10 @@ impl Made {
         };
         // 128 and the signal's number: somebody asked for it.
         let is_stopped = failure.exit_code() >= 128;
-        let cut = match is_stopped {
-            true => Cut::Stopped(journal),
-            false => Cut::Failed,
+        let cut = match (is_stopped, failure.tells_worse()) {
+            (true, _) => Cut::Stopped(journal),
+            (false, true) => Cut::Worse,
+            (false, false) => Cut::Failed,
         };
         let machine = &args.axis;
         let told = self.standing(&cut, (&machine.machine.config, machine.axis.as_deref()));
@@ -96,6 +99,7 @@ impl Made {
         told.text += match cut {
             Cut::Stopped(_) => "\nNOT VERIFIED: its verification was stopped",
             Cut::Failed => "\nNOT VERIFIED: its verification failed",
+            Cut::Worse => "\nNOT GOOD: its verification shows that it makes the machine worse",
         };
         let mut stored = Vec::new();
         for ((pointer, id), is_used) in self.stored.iter().zip(used) {
@@ -114,6 +118,7 @@ impl Made {
         let (ended, journal) = match cut {
             Cut::Stopped(journal) => ("stopped", journal.as_ref()),
             Cut::Failed => ("failed", None),
+            Cut::Worse => ("worse", None),
         };
         let commands: Vec<&String> = next.iter().map(|it| &it.0).collect();
         // As the kind calls it.
@@ -138,6 +143,10 @@ impl Made {
         is_in_use: bool,
         (config, axis): (&Path, Option<&str>),
     ) -> Vec<(String, &'static str)> {
+        // Nobody is led to use it; what to look for is in the failure.
+        if *cut == Cut::Worse {
+            return Vec::new();
+        }
         let config = config.display();
         let axis = axis.map_or(String::new(), |it| format!(" --axis {it}"));
         let verify = format!("truestage verify {config}{axis}");
@@ -152,7 +161,7 @@ impl Made {
         }
         let mut next = vec![match cut {
             Cut::Stopped(Some(_)) => (format!("{verify} --resume"), "goes on with that"),
-            Cut::Stopped(None) | Cut::Failed => (verify, "verifies it"),
+            Cut::Stopped(None) | Cut::Failed | Cut::Worse => (verify, "verifies it"),
         }];
         let all = self.stored.iter();
         if all.clone().all(|it| self.store.earlier(&it.0).is_ok()) {
@@ -288,5 +297,16 @@ mod tests {
         assert_eq!(it.value["verification"]["next"], commands);
         let path = it.value["verification"]["stored"][0]["path"].as_str();
         assert!(path.is_some_and(|it| Path::new(it).exists()));
+    }
+
+    #[test]
+    fn nobody_is_led_to_use_what_makes_the_machine_worse() {
+        let (_folder, store, [first, second]) = stored();
+        store.activate("x", &first).unwrap();
+        let it = told(&store, &[("x", &second)], &Cut::Worse);
+        assert!(it.text.contains("NOT GOOD"), "{}", it.text);
+        assert!(!it.text.contains("cal activate"), "{}", it.text);
+        assert_eq!(it.value["verification"]["ended"], "worse");
+        assert_eq!(it.value["verification"]["next"], json!([]));
     }
 }

@@ -286,6 +286,10 @@ fn advice(axis: &str, refused: &PeriodicError) -> String {
 }
 
 impl KindFailure for RotaryFailure {
+    fn tells_worse(&self) -> bool {
+        matches!(self, Self::MadeWorse { .. })
+    }
+
     fn exit_code(&self) -> u8 {
         match self {
             Self::OtherPlate { .. }

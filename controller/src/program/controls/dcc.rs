@@ -31,7 +31,7 @@ pub(super) struct Issuer<'a> {
 
 /// What it certifies.
 #[derive(Default)]
-pub(super) struct Certifiable {
+pub(crate) struct Certifiable {
     title: String,
     results: String,
     /// Conditions that the head of a record does not have.
@@ -45,7 +45,7 @@ pub(super) struct Certifiable {
 impl Certifiable {
     /// # Errors
     /// When an uncertainty is not known.
-    pub(super) fn linear(axis: &str, content: &LinearContent) -> Result<Self, Failure> {
+    pub(crate) fn linear(axis: &str, content: &LinearContent) -> Result<Self, Failure> {
         let sides = content.approaches();
         let u = |it: &NodeRecord| (sides.iter()).all(|side| uncertainty(it, *side).is_some());
         if !content.nodes.iter().all(u) {
@@ -60,7 +60,7 @@ impl Certifiable {
 
     /// # Errors
     /// As [`Self::linear`].
-    pub(super) fn rotary(axis: &str, content: &RotaryContent) -> Result<Self, Failure> {
+    pub(crate) fn rotary(axis: &str, content: &RotaryContent) -> Result<Self, Failure> {
         let u = content.standard_uncertainty_rad.as_deref();
         let u = u.ok_or_else(without_uncertainty)?;
         let lines = content.table_error_rad.len();

@@ -10,18 +10,17 @@ use machine::records::{CalibrationRecord, RecordHead, Store};
 use serde_json::{Map, Value, json};
 
 use super::correction::{Correction, Side};
-use super::dcc::{Certifiable, Issuer};
+use super::dcc::Issuer;
 use super::exported::{Exported, Written};
 use super::format::FormatName;
 use super::{csv, dcc, linuxcnc, pmac, sinumerik};
 use crate::config::{self, Loaded};
 use crate::linear::LinearContent;
-use crate::platform::ScrewContent;
 use crate::program::belongs::head_of;
+use crate::program::kind::of_kind;
 use crate::program::output::{Ended, Output};
 use crate::rotary::RotaryContent;
 use crate::rotary::settings::periodic_compensation;
-use crate::volumetric::GeometryContent;
 use crate::{Failure, linear};
 
 const EXAMPLES: &str = "Examples:\n  truestage cal export machine.toml 3f2a --format csv --out x.csv\n  \
@@ -192,26 +191,13 @@ fn written(
 /// Of the record as it is, whatever the configuration has become since.
 fn certificate(args: &ExportArgs, store: &Store, id: &str) -> Result<Written, Failure> {
     let glance = store.glance(id)?;
-    let head = &glance.head;
-    let certified = match glance.kind {
-        LinearContent::KIND => {
-            Certifiable::linear(&head.axis, &store.load::<LinearContent>(id)?.content)
-        }
-        RotaryContent::KIND => {
-            Certifiable::rotary(&head.axis, &store.load::<RotaryContent>(id)?.content)
-        }
-        ScrewContent::KIND => {
-            Certifiable::screw(&head.axis, &store.load::<ScrewContent>(id)?.content)
-        }
-        GeometryContent::KIND => Certifiable::volume(&store.load::<GeometryContent>(id)?.content),
-        kind => return Err(not_certified(kind)),
-    }?;
+    let certified = (of_kind(glance.kind).certifiable)(store, id)?;
     let issuer = Issuer {
         laboratory: args.laboratory.as_deref(),
         country: args.country.as_deref(),
         person: args.person.as_deref(),
     };
-    dcc::written(id, head, &certified, &issuer)
+    dcc::written(id, &glance.head, &certified, &issuer)
 }
 
 /// The record itself; nothing is chosen or interpolated.
@@ -272,16 +258,6 @@ fn of_rotary(
     })?;
     let made = periodic_compensation(own, &head.axis, table)?;
     Ok(Correction::Rotary(Box::new(made)))
-}
-
-/// What detectors read is no property of a machine by itself.
-fn not_certified(kind: &str) -> Failure {
-    Failure::Usage {
-        what: format!(
-            "--format dcc: a record of the kind {kind} says what detectors of this machine read, which certifies nothing"
-        ),
-        help: "export the calibration that it counts from; `cal list` names all, `cal show --json` prints this one".into(),
-    }
 }
 
 fn not_of_one_axis(format: FormatName, head: &RecordHead, kind: &str) -> Failure {

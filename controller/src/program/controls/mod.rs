@@ -6,7 +6,7 @@
 
 mod correction;
 mod csv;
-mod dcc;
+pub(crate) mod dcc;
 pub(crate) mod export;
 mod exported;
 mod format;

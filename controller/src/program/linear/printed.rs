@@ -192,6 +192,7 @@ fn cycle() -> Vec<Form> {
             .judged(),
         Form::new("calibrate", "of a linear axis", calibrated())
             .counted()
+            .tried()
             .judged(),
         Form::new("verify", "of a linear axis", verified())
             .counted()

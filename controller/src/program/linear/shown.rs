@@ -3,14 +3,20 @@
 use serde_json::json;
 use units::Metres;
 
+use crate::Failure;
 use crate::linear::LinearContent;
 use crate::linear::record::NodeRecord;
+use crate::program::controls::dcc::Certifiable;
 use crate::program::page::chart::{BLUE, ORANGE};
 use crate::program::page::compare::{Pair, overlaid};
 use crate::program::show::{Changes, Show};
 use crate::program::text;
 
 impl Show for LinearContent {
+    fn certifiable(&self, axis: &str) -> Result<Certifiable, Failure> {
+        Certifiable::linear(axis, self)
+    }
+
     fn lines(&self) -> String {
         let head = format!(
             "{} runs, {}\n  position (mm)   forward (µm)   reverse (µm)        u (µm)",

@@ -16,6 +16,7 @@ use crate::platform::PlatformFailure;
 use crate::platform::PlatformLog;
 use crate::platform::{ScrewContent, ScrewMethodName};
 use crate::program::budget;
+use crate::program::controls::dcc::Certifiable;
 use crate::program::data_file::head_of;
 use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
@@ -317,6 +318,10 @@ fn limits_of(loaded: &config::Loaded, axis: &str) -> Limits {
 }
 
 impl Show for ScrewContent {
+    fn certifiable(&self, axis: &str) -> Result<Certifiable, Failure> {
+        Certifiable::screw(axis, self)
+    }
+
     fn lines(&self) -> String {
         shown(self)
     }

@@ -90,6 +90,7 @@ fn calibrate() -> Form {
     let more = [("verified?", verified)];
     Form::new("calibrate", "of a platform", and(calibrated(), more))
         .counted()
+        .tried()
         .judged()
 }
 

@@ -14,6 +14,7 @@ use serde_json::json;
 use units::Radians;
 
 use crate::program::budget;
+use crate::program::controls::dcc::Certifiable;
 use crate::program::data_file::rotary_head_of;
 use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
@@ -325,6 +326,10 @@ fn save(
 }
 
 impl Show for RotaryContent {
+    fn certifiable(&self, axis: &str) -> Result<Certifiable, Failure> {
+        Certifiable::rotary(axis, self)
+    }
+
     fn lines(&self) -> String {
         shown(self)
     }

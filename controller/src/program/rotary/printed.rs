@@ -115,6 +115,7 @@ fn calibrate() -> Form {
     ];
     Form::new("calibrate", "of a rotary axis", and(calibrated(), more))
         .counted()
+        .tried()
         .judged()
 }
 

@@ -34,6 +34,12 @@ impl Form {
         self
     }
 
+    /// A calibration whose verification may be cut short.
+    pub(crate) fn tried(mut self) -> Self {
+        self.members.push(("verification?", part("verification")));
+        self
+    }
+
     /// The result may be a bad one: then the failure is beside it.
     pub(crate) fn judged(mut self) -> Self {
         self.is_judged = true;

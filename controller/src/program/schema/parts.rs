@@ -44,7 +44,32 @@ pub(super) fn all() -> Vec<(&'static str, Shape)> {
         ("figures", all_figures()),
         ("contribution", contribution()),
         ("certificate", certificate()),
+        ("verification", verification()),
     ]
+}
+
+/// A verification that did not come to figures of a good calibration, and what is stored all the same.
+fn verification() -> Shape {
+    let stored = object([
+        ("of", text().about("The axis, or what else has one in use.")),
+        ("calibration", text()),
+        ("path", text()),
+        ("in_use", truth()),
+    ]);
+    object([
+        ("ended", word(&["stopped", "failed", "worse"])),
+        (
+            "journal",
+            text()
+                .or_null()
+                .about("With which it goes on; null where there is none."),
+        ),
+        ("stored", list(stored)),
+        ("next", list(text()).about("Commands.")),
+    ])
+    .about(
+        "A verification that was cut short, or shows that the calibration makes the machine worse.",
+    )
 }
 
 /// One finding of a configuration.

@@ -94,6 +94,7 @@ fn cycle() -> Vec<Form> {
         Form::new("zero", "of three axes", [("axes", axes)]).counted(),
         Form::new("calibrate", "of three axes", and(calibrated(), tried))
             .counted()
+            .tried()
             .judged(),
         Form::new("verify", "of three axes", verified())
             .counted()

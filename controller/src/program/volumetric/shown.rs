@@ -5,7 +5,9 @@ mod references;
 
 use serde_json::json;
 
+use crate::Failure;
 use crate::program::budget;
+use crate::program::controls::dcc::Certifiable;
 use crate::program::show::{Changes, Show};
 use crate::program::volumetric::uncertainty;
 use crate::volumetric::{
@@ -16,6 +18,10 @@ use references::references;
 pub(crate) use references::reference_changes;
 
 impl Show for GeometryContent {
+    fn certifiable(&self, _axis: &str) -> Result<Certifiable, Failure> {
+        Certifiable::volume(self)
+    }
+
     fn lines(&self) -> String {
         shown(self)
     }

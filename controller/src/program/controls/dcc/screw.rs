@@ -12,7 +12,7 @@ use crate::store::budget::PlacesBudgetRecord;
 impl Certifiable {
     /// # Errors
     /// When an uncertainty is not known.
-    pub(in super::super) fn screw(axis: &str, content: &ScrewContent) -> Result<Self, Failure> {
+    pub(crate) fn screw(axis: &str, content: &ScrewContent) -> Result<Self, Failure> {
         let model = content.model();
         let parameters = parameters(&model).ok_or_else(without_uncertainty)?;
         let title = format!(

@@ -17,7 +17,7 @@ const SQUARENESSES: [&str; 3] = [
 impl Certifiable {
     /// # Errors
     /// When an uncertainty is not known.
-    pub(in super::super) fn volume(content: &GeometryContent) -> Result<Self, Failure> {
+    pub(crate) fn volume(content: &GeometryContent) -> Result<Self, Failure> {
         let functions = content.functions.iter().map(function);
         let functions = functions.collect::<Option<String>>();
         let functions = functions.ok_or_else(without_uncertainty)?;
