@@ -37,6 +37,8 @@ go_on = { operator = "lay a part on the stage" }
 position_mm = 12.5
 """
 PATH = "time_s,x_mm,y_mm,z_mm\n0,5,5,5\n2,9,5,5\n4,9,9,5\n"
+# Where its last row ends.
+PATH_END = (9, 9, 5)
 # Three axes with rare SYNCs: how well they follow is judged elsewhere.
 RARE_SYNCS = (
     ("sync_period_ms = 2.0", "sync_period_ms = 60.0"),
@@ -148,8 +150,11 @@ class Person:
         self._press("Start")
         self.pace.slow = False
         self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('\\ndone\\n')")
-        self.pace.slow = True
         place = "[...document.querySelectorAll('#axes .position')].map((it) => parseFloat(it.textContent))"
+        # Where the axes are is told a moment later than that the run has ended.
+        there = f"{json.dumps(PATH_END)}.every((mm, axis) => Math.abs({place}[axis] - mm) < 0.01)"
+        self.browser.wait_for("the axes at its end", there)
+        self.pace.slow = True
         return {"slip": slip, "planned": planned, "ended": self.browser.value(place)}
 
     def _plan_path(self, rows):

@@ -66,7 +66,24 @@ pub(super) struct Looked {
     #[param(minimum = 0, maximum = 300)]
     wait_s: Option<f64>,
     /// So many of its `reached` points were heard before, and are left out.
+    #[param(minimum = 0, maximum = 1000000000)]
     heard: Option<u64>,
+}
+
+/// No run reaches more points.
+const HEARD_MAX: u64 = 1_000_000_000;
+
+impl Looked {
+    /// So many points are left out.
+    fn left_out(&self) -> Result<usize, Problem> {
+        let heard = self.heard.unwrap_or_default();
+        let few = usize::try_from(heard).ok().filter(|_| heard <= HEARD_MAX);
+        few.ok_or_else(|| {
+            let what = format!("heard = {heard} is more than any run has points");
+            let help = format!("give a number from 0 to {HEARD_MAX}");
+            Problem::new(Code::BadRequest, what, help)
+        })
+    }
 }
 
 /// A run, once it has ended or the time to wait is over.
@@ -82,11 +99,11 @@ pub(super) async fn run(
     Named(id): Named,
     looked: MaybeQuery<Looked>,
 ) -> Result<Json<RunView>, Problem> {
-    let Looked { wait_s, heard } = query(looked)?;
+    let looked = query(looked)?;
+    let (left_out, wait_s) = (looked.left_out()?, looked.wait_s);
     let asked = Wait { wait_s }.until(|| state.desk.run(&id), |it| it.state.is_end());
     let mut run = asked.await?;
-    let heard = usize::try_from(heard.unwrap_or_default()).unwrap_or(usize::MAX);
-    run.reached.drain(..heard.min(run.reached.len()));
+    run.reached.drain(..left_out.min(run.reached.len()));
     Ok(Json(run))
 }
 
