@@ -5,7 +5,7 @@ use crate::store::StoreError;
 
 impl Failure {
     /// Whether it says that a calibration makes the machine worse.
-    pub(crate) fn tells_worse(&self) -> bool {
+    pub fn tells_worse(&self) -> bool {
         match self {
             Self::Kind(failure) => failure.tells_worse(),
             other => matches!(other, Self::MadeWorse { .. }),
