@@ -50,7 +50,7 @@ impl Watcher {
 /// depend on the instant. `INSTANTS=200` for more.
 fn instants(rig: Rig) -> u32 {
     let wanted = std::env::var("INSTANTS").ok();
-    let usual = if rig == Rig::Vcan { 1 } else { 4 };
+    let usual = if rig == Rig::Vcan { 1 } else { 2 };
     wanted.map_or(usual, |it| it.parse().expect("INSTANTS is a number"))
 }
 

@@ -26,7 +26,7 @@ use crate::scene::{power_state, shortened};
 use crate::witness::{Testimony, Witnessed};
 
 /// How many runs on each change.
-const RUNS: u64 = 120;
+const RUNS: u64 = 60;
 /// One in so many is also repaired, and must work again.
 const RECOVERIES: u64 = 6;
 /// How many controllers are killed.

@@ -28,6 +28,7 @@ mod spot_cameras;
 mod stand;
 pub mod stream;
 pub mod volume;
+mod whole;
 
 pub use coverage::Coverage;
 pub use desk::{Desk, cia402_settings};
@@ -47,3 +48,4 @@ pub use slcan_hub::SlcanHub;
 pub use spot_cameras::with_emulated_spot_cameras;
 pub use stand::{Stand, on_every_rig};
 pub use truestage::for_tests::{Edit, with_spot_cameras};
+pub use whole::in_every_run;

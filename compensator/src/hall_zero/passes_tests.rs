@@ -72,7 +72,7 @@ fn judge_stages(seed: u64, count: u32) {
 
 #[test]
 fn sound_stages_are_not_blamed_and_their_uncertainty_is_whole() {
-    judge_stages(17, 200);
+    judge_stages(17, 80);
 }
 
 #[test]

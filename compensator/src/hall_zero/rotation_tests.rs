@@ -133,7 +133,7 @@ fn judge_gantries(seed: u64, count: u32) {
 
 #[test]
 fn an_angle_lies_within_what_it_states() {
-    judge_gantries(31, 200);
+    judge_gantries(31, 80);
 }
 
 #[test]

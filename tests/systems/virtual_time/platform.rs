@@ -4,15 +4,17 @@ use core::time::Duration;
 
 use mock_bus::node::cia402_drive::Cia402DriveNode;
 use mock_bus::node::copley_amp::CopleyAmpsNode;
-use tests::{Bench, EDGE, Edit, PoseJudge, Shipped, UVW, UVW_COPLEY, true_pose};
+use tests::{Bench, EDGE, Edit, PoseJudge, Shipped, UVW, UVW_COPLEY, in_every_run, true_pose};
 use truestage::Failure;
 use truestage::for_tests::PoseMoved;
 use truestage::platform::Pose;
 use units::{Approach, Metres, Time};
 
 /// How many poses are visited as found, and as left.
-const FOUND: u32 = 60;
-const LEFT: u32 = 500;
+const FOUND: u32 = 40;
+fn how_many_left() -> u32 {
+    in_every_run(150, 500)
+}
 
 /// A platform under one method of estimating and one rule of compensating.
 #[derive(Clone, Copy)]
@@ -61,7 +63,7 @@ fn run(bench: &mut Bench, seed: u64, shipped: &Shipped) -> Result<Cycle, Failure
     let found = visit(bench, &judge, seed, FOUND)?;
     bench.machine.platform()?.move_to(Pose::default())?;
     bench.machine.platform()?.calibrate(&store)?;
-    let left = visit(bench, &judge, seed + 1000, LEFT)?;
+    let left = visit(bench, &judge, seed + 1000, how_many_left())?;
     bench.machine.shut_down()?;
     Ok(Cycle {
         found,
@@ -212,11 +214,12 @@ fn report(case: Case, results: &[(u64, Cycle)]) {
     let random = results[0].1.random;
     let scatter = scatter(results.iter().map(|(_, it)| &it.left));
     println!(
-        "{}: {} platforms, as found up to {found:.3} µm, as left in {LEFT} moves up to {:.3} µm \
+        "{}: {} platforms, as found up to {found:.3} µm, as left in {} moves up to {:.3} µm \
          (limit {} µm)\n  chance: 3 σ of a pose {:.3} µm by the plant's configuration; σ of a stop \
          {:.1} nm, seen {:.1} nm\n  starts within {told:?} as reported, {truly:?} in truth",
         case.method,
         case.seeds,
+        how_many_left(),
         worst(|it| it.left.largest),
         case.limit.um(),
         3.0 * random.pose.um(),

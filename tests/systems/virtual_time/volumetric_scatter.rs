@@ -2,6 +2,7 @@
 
 use machine::records::read_journal;
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
+use tests::in_every_run;
 use tests::volume::{Volume, quick};
 use truestage::Failure;
 use truestage::emulated::Emulated;
@@ -52,7 +53,7 @@ impl LineOperator for Careless {
 /// Lines along an axis, across it, and a diagonal of the body.
 #[test]
 fn a_count_that_slips_is_stored_nowhere_and_its_line_is_named_and_read_again_alone() {
-    for slips_on in [2, 17, 20] {
+    for slips_on in in_every_run(vec![17], vec![2, 17, 20]) {
         let mut volume = Volume::zeroed(1, quick, |text| text);
         let store = volume.bench.store.clone();
         let mut hand = Careless {
