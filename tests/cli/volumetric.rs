@@ -16,15 +16,14 @@ use truestage::volumetric::{VerifyBy, WarmUp};
 use crate::demo;
 use crate::programs::{check_error, check_says, number, page, text, truestage};
 
-/// A machine that was calibrated twice and verified before and after, in virtual time.
-struct Runs {
+/// A machine that was calibrated once in virtual time.
+struct Calibrated {
     volume: Volume,
-    calibrated: [(String, String); 2],
-    found: String,
-    left: String,
+    id: String,
+    journal: String,
 }
 
-impl Runs {
+impl Calibrated {
     fn folder(&self) -> &Path {
         self.volume.bench.folder.path()
     }
@@ -34,40 +33,57 @@ impl Runs {
     }
 }
 
-fn runs() -> Runs {
+/// One that was calibrated a second time, and verified without and with that.
+struct Verified {
+    calibrated: Calibrated,
+    again: (String, String),
+    found: String,
+    left: String,
+}
+
+fn calibrate(volume: &mut Volume) -> (String, String) {
+    let (mut hand, store) = (volume.bench.emulated.clone(), volume.bench.store.clone());
+    let mut work = volume.bench.machine.volumetric().unwrap();
+    let made = good(work.calibrate(&store, WarmUp::None, None, &mut hand));
+    (made.id, made.journal.display().to_string())
+}
+
+fn calibrated() -> Calibrated {
     let mut volume = Volume::zeroed(1, quick, |text| text);
-    let mut hand = volume.bench.emulated.clone();
-    let store = volume.bench.store.clone();
-    let machine = &mut volume.bench.machine;
-    let place = |path: &Path| path.display().to_string();
-    let mut calibrated = || {
-        let made = machine
-            .volumetric()
-            .unwrap()
-            .calibrate(&store, WarmUp::None, None, &mut hand);
-        let made = good(made);
-        (made.id, place(&made.journal))
-    };
-    let both = [calibrated(), calibrated()];
-    let mut verified = |by| good(machine.volumetric().unwrap().verify(&store, by, &mut hand));
-    let found = place(&verified(VerifyBy::AsFound).journal);
-    let left = place(&verified(VerifyBy::Everything).journal);
-    good(machine.shut_down());
+    let (id, journal) = calibrate(&mut volume);
     let folder = volume.bench.folder.path();
     let text = quick(VOLUMETRIC.machine.to_owned());
     let text = text.edit("machine-data", &folder.display().to_string());
     fs::write(folder.join("machine.toml"), text).expect("there is room");
-    Runs {
-        calibrated: both,
-        found,
-        left,
+    Calibrated {
         volume,
+        id,
+        journal,
+    }
+}
+
+fn verified() -> Verified {
+    let mut calibrated = calibrated();
+    let volume = &mut calibrated.volume;
+    let again = calibrate(volume);
+    let (mut hand, store) = (volume.bench.emulated.clone(), volume.bench.store.clone());
+    let machine = &mut volume.bench.machine;
+    let mut verified = |by| good(machine.volumetric().unwrap().verify(&store, by, &mut hand));
+    let found = verified(VerifyBy::AsFound);
+    let left = verified(VerifyBy::Everything);
+    good(machine.shut_down());
+    Verified {
+        calibrated,
+        again,
+        found: found.journal.display().to_string(),
+        left: left.journal.display().to_string(),
     }
 }
 
 #[test]
 fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
-    let runs = runs();
+    let verified = verified();
+    let runs = &verified.calibrated;
     let checked = runs.run(&["check", "machine.toml"]).with_code(0);
     assert_eq!(checked["machine"], "volumetric");
     let list = runs.run(&["cal", "list"]).with_code(0);
@@ -76,7 +92,7 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
     let mut kinds: Vec<&str> = active.map(|it| text(&it["kind"])).collect();
     kinds.sort_unstable();
     assert_eq!(kinds, ["beam_references", "volumetric_geometry"]);
-    let [(first, _), (second, journal)] = &runs.calibrated;
+    let (first, (second, journal)) = (&runs.id, &verified.again);
     let shown = runs
         .run(&["cal", "show", "machine.toml", second])
         .with_code(0);
@@ -103,8 +119,8 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
     check_says(&calibrated, &errors);
     check_says(&calibrated, &["x (mm)", "°C", "Residuals", &second[..12]]);
     let (found, left) = (
-        page(runs.folder(), &runs.found),
-        page(runs.folder(), &runs.left),
+        page(runs.folder(), &verified.found),
+        page(runs.folder(), &verified.left),
     );
     check_says(&found, &["Line as found", "deviation (µm)", "<svg"]);
     check_says(&left, &["Line as left", "correction x, y, z (µm)", "°C"]);
@@ -113,7 +129,7 @@ fn what_three_axes_measured_is_listed_shown_compared_and_made_into_pages() {
 /// Nothing moves and nobody is asked: the machine was shut down.
 #[test]
 fn a_designed_shape_is_imported_from_a_file_and_one_that_cannot_be_is_refused_with_its_row() {
-    let runs = runs();
+    let runs = calibrated();
     let import = |rows: &str| {
         let csv = format!("axis,along,position_mm,displacement_um\n{rows}");
         fs::write(runs.folder().join("shape.csv"), csv).expect("there is room");
@@ -203,7 +219,7 @@ fn functions_of_beams() -> String {
 /// Nothing moves and nobody is asked: the machine was shut down.
 #[test]
 fn references_that_are_known_beforehand_are_imported_as_a_table_and_as_functions() {
-    let runs = runs();
+    let runs = calibrated();
     let list = runs.run(&["cal", "list"]).with_code(0);
     let list = list["calibrations"].as_array().expect("a list").clone();
     let is_used = |it: &&serde_json::Value| it["kind"] == "beam_references" && it["active"] == true;
@@ -299,8 +315,8 @@ fn csv_of(journal: &str) -> String {
 
 #[test]
 fn errors_follow_again_from_a_journal_and_from_a_file_of_its_readings() {
-    let runs = runs();
-    let (id, journal) = &runs.calibrated[1];
+    let runs = calibrated();
+    let (id, journal) = (&runs.id, &runs.journal);
     let fit = |words: &[&str]| runs.run(&[&["fit", "volumetric"], words].concat());
     let config = ["--config", "machine.toml"];
     let from_journal = fit(&[&[journal.as_str()], &config[..], &["--save"]].concat()).with_code(0);
@@ -340,7 +356,7 @@ fn errors_follow_again_from_a_journal_and_from_a_file_of_its_readings() {
     refuses_files(&runs, &csv);
 }
 
-fn refuses_files(runs: &Runs, csv: &str) {
+fn refuses_files(runs: &Calibrated, csv: &str) {
     let refused = |csv: &str, words: &[&str]| {
         fs::write(runs.folder().join("wrong.csv"), csv).expect("there is room");
         let fit = ["fit", "volumetric", "wrong.csv", "--config", "machine.toml"];

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use tests::{Bench, Edit, Hand, with_few_lines};
+use tests::{Bench, Edit, Hand, in_every_run, with_few_lines};
 use truestage::emulated::Emulated;
 use truestage::for_tests::{Asked, Person, Question, RotaryCalibrated};
 use truestage::rotary::{Operator, PlateMove, PlateTask};
@@ -12,7 +12,6 @@ use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, is_enabled, residual, s
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;
-const TABLES: u64 = 6;
 
 /// A plate of 72 lines on a table without harmonics that these cannot see.
 fn bench(seed: u64) -> Bench {
@@ -117,7 +116,7 @@ fn calibrate(
 
 #[test]
 fn tables_read_through_a_microscope_are_as_right_as_by_the_touch_probe_and_as_sure_as_they_say() {
-    check_tables((TABLES, LINES), |seed| {
+    check_tables((in_every_run(3, 6), LINES), |seed| {
         let mut bench = bench(seed);
         started(&mut bench);
         let mut person = AtTheMicroscope::of(&bench);

@@ -1,7 +1,7 @@
 //! A rotary table whose plate passes a photodiode at an analog input: judged by the plant's truth.
 
 use mock_bus::fault::{Fault, FaultConfig};
-use tests::{Bench, Edit, Hand, with_emulated_line_signal};
+use tests::{Bench, Edit, Hand, in_every_run, with_emulated_line_signal};
 use truestage::for_tests::{RotaryCalibrated, with_line_signal};
 use truestage::rotary::{RotaryFailure, SweepOptions};
 use truestage::{CalibrateOptions, Failure};
@@ -11,7 +11,6 @@ use super::rotary::{LIMIT_ARCSEC, check_tables, hand_of, residual, started};
 
 const AXIS: &str = "c";
 const LINES: u32 = 72;
-const TABLES: u64 = 6;
 
 /// A plate of 72 lines on a table without harmonics that these cannot see.
 fn bench(seed: u64) -> Bench {
@@ -38,7 +37,7 @@ fn inject(bench: &Bench, fault: Fault) {
 
 #[test]
 fn tables_read_by_a_photodiode_are_as_right_as_by_the_touch_probe_and_as_sure_as_they_say() {
-    check_tables((TABLES, LINES), |seed| {
+    check_tables((in_every_run(3, 6), LINES), |seed| {
         let mut bench = bench(seed);
         started(&mut bench);
         let mut hand = hand_of(&bench.emulated);

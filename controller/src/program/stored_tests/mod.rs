@@ -25,7 +25,7 @@ use crate::{Failure, platform, rotary};
 use machine::records::{Store, opened, sealed};
 
 /// So many of each kind in every run.
-pub(super) const QUICK: usize = 400;
+pub(super) const QUICK: usize = 200;
 /// A case may take so many times the processor time of the file as it was written, on the same
 /// computer; several files become several times as long by being edited.
 const WORK_MAX: u32 = 200;
