@@ -131,6 +131,9 @@ impl Segment {
 
 /// The pieces between strictly increasing `nodes` (at least two) with their `values`.
 ///
+/// # Panics
+/// With fewer nodes, or of another number than the values.
+///
 /// # Example
 ///
 /// ```
@@ -143,7 +146,7 @@ impl Segment {
 /// assert_eq!(lines[0].value(1.5), 5.0);
 /// ```
 pub fn segments(nodes: &[f64], values: &[f64], kind: Interpolation) -> Vec<Segment> {
-    debug_assert!(nodes.len() >= 2 && nodes.len() == values.len());
+    assert!(nodes.len() >= 2 && nodes.len() == values.len());
     let slopes = match kind {
         Interpolation::MonotoneCubic => monotone_slopes(nodes, values),
         Interpolation::PiecewiseConstant | Interpolation::Linear => Vec::new(),

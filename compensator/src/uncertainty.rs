@@ -114,6 +114,9 @@ pub fn of_rounding(step: f64) -> f64 {
 ///
 /// `covariance` is square, row by row, of the gradient's length.
 ///
+/// # Panics
+/// Of another length.
+///
 /// # Example
 ///
 /// ```
@@ -125,7 +128,7 @@ pub fn of_rounding(step: f64) -> f64 {
 /// ```
 pub fn propagate(gradient: &[f64], covariance: &[f64]) -> f64 {
     let n = gradient.len();
-    debug_assert_eq!(covariance.len(), n * n);
+    assert_eq!(covariance.len(), n * n);
     let mut variance = 0.0;
     for (row, gi) in gradient.iter().enumerate() {
         for (column, gj) in gradient.iter().enumerate() {

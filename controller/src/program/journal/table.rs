@@ -150,7 +150,7 @@ impl Table {
                 self.columns.len() - 1
             });
             let cells = &mut self.columns[at].cells;
-            debug_assert_eq!(cells.len(), self.rows, "two values of one name");
+            assert_eq!(cells.len(), self.rows, "two values of one name");
             cells.push(cell);
         }
         self.rows += 1;

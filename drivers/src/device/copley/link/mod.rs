@@ -199,7 +199,7 @@ impl Link {
 
     /// Wants to ask; only on a free link.
     pub(super) fn ask(&mut self, request: Request, urgency: Urgency, since: Time) {
-        debug_assert!(self.is_free());
+        assert!(self.is_free());
         self.state = State::Waiting {
             request,
             urgency,

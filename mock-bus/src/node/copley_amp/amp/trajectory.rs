@@ -180,7 +180,7 @@ impl Amp {
         self.offset -= position;
         self.profile = self.profile.clone().shifted(-(position as f64));
         self.trajectory.insert(TrajectoryStatus::REFERENCED);
-        debug_assert!(self.demand(now).position.is_finite());
+        assert!(self.demand(now).position.is_finite());
     }
 
     /// What the demand's profile was for may be over.
