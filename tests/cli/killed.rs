@@ -235,7 +235,10 @@ fn the_run_of_a_service_that_is_killed_in_motion_is_found_each_time_and_goes_on(
              time, and no stage went on by more than {farthest:.3} mm at {SLOWLY_MM_PER_S} mm/s",
             instants(rig)
         );
-        goes_on_to_its_end(&bench, &left.expect("there was an instant"));
+        // Minutes of the machine, for which no bus matters; on `SocketCAN` it would be the longest test of all.
+        if rig != Rig::Vcan {
+            goes_on_to_its_end(&bench, &left.expect("there was an instant"));
+        }
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }
