@@ -26,20 +26,23 @@ fn moved(observation: &mut Observation, by: f64) {
     }
 }
 
-/// The same readings as noise alone, `factor` times what is stated.
+/// The same readings as noise alone, `factor` times what is stated: each its own, and what they have in common.
 fn noise_alone(observations: &mut [Observation], factor: f64, noise: &mut Noise) {
+    let is_shared = observations.iter().any(|it| it.common != 0.0);
+    let shared = if is_shared { noise.normal() } else { 0.0 };
     for it in observations {
+        let error = factor * (it.u_by_itself() * noise.normal() + it.common * shared);
         match &mut it.reading {
-            Reading::Length { deviation, u, .. } => *deviation = *u * (factor * noise.normal()),
-            Reading::Angle { deviation, u, .. } => *deviation = *u * (factor * noise.normal()),
+            Reading::Length { deviation, .. } => *deviation = Metres(error),
+            Reading::Angle { deviation, .. } => *deviation = Radians(error),
         }
     }
 }
 
 /// How often something is found in `tries` sound calibrations.
-fn alarms(tries: u64, seeds: u64, factor: f64, false_alarms: f64) -> usize {
-    let mut measured = Rig::default().measured(seeds);
-    let mut noise = Noise(seeds);
+fn alarms(rig: &Rig, (tries, seed): (u64, u64), factor: f64, false_alarms: f64) -> usize {
+    let mut measured = rig.measured(seed);
+    let mut noise = Noise(seed);
     let is_alarm = |_: &u64| {
         noise_alone(&mut measured.observations, factor, &mut noise);
         let design = Design::new(&measured.plan, &measured.observations).unwrap();
@@ -49,25 +52,43 @@ fn alarms(tries: u64, seeds: u64, factor: f64, false_alarms: f64) -> usize {
     (0..tries).filter(is_alarm).count()
 }
 
+/// A laser of which 1 ppm is not known: five times what one reading is uncertain by at the end of a line.
+fn with_one_laser() -> Rig {
+    Rig {
+        in_common: 1e-6,
+        ..Rig::default()
+    }
+}
+
 /// Bonferroni's bound holds from above: of 60, at most 12 are expected at 0.2, and 25 are exceeded
 /// once in 30 000 times. With noise larger than stated it is alike, as far as
 /// the limit of the ratio lets it pass.
 #[test]
 fn sound_readings_alarm_no_more_often_than_is_stated() {
-    for (seed, factor) in [(1, 1.0), (2, 0.5), (3, 1.3)] {
-        let seen = alarms(60, seed, factor, 0.2);
+    let (alone, shared) = (Rig::default(), with_one_laser());
+    for (rig, seed, factor) in [
+        (&alone, 1, 1.0),
+        (&alone, 2, 0.5),
+        (&alone, 3, 1.3),
+        (&shared, 5, 1.0),
+    ] {
+        let seen = alarms(rig, (60, seed), factor, 0.2);
         assert!(seen <= 25, "{seen} at {factor}");
     }
-    assert!(alarms(60, 4, 1.0, GROSS_FALSE_ALARMS) <= 1);
+    assert!(alarms(&alone, (60, 4), 1.0, GROSS_FALSE_ALARMS) <= 1);
 }
 
 /// 2 are expected of 20 000; more than 8 once in 4000 times.
 #[test]
 #[ignore = "a count of minutes"]
 fn the_rate_of_false_alarms_over_many_calibrations() {
-    for (seed, factor) in [(101, 1.0), (102, 1.3)] {
-        let seen = alarms(20_000, seed, factor, GROSS_FALSE_ALARMS);
-        println!("{seen} of 20000 at {GROSS_FALSE_ALARMS}, noise {factor} times as stated");
+    let (alone, shared) = (Rig::default(), with_one_laser());
+    for (rig, seed, factor) in [(&alone, 101, 1.0), (&alone, 102, 1.3), (&shared, 103, 1.0)] {
+        let seen = alarms(rig, (20_000, seed), factor, GROSS_FALSE_ALARMS);
+        let common = rig.in_common;
+        println!(
+            "{seen} of 20000 at {GROSS_FALSE_ALARMS}, noise {factor} times as stated, {common} in common"
+        );
         assert!(seen <= 8, "{seen}");
     }
 }
