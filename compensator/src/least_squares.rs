@@ -116,102 +116,125 @@ impl Fit {
 /// # Ok::<(), LeastSquaresError>(())
 /// ```
 pub fn solve(design: &[f64], columns: usize, observed: &[f64]) -> Result<Fit, LeastSquaresError> {
-    check(design, columns, observed)?;
-    let rows = observed.len();
-    let mut matrix = DMatrix::from_row_slice(rows, columns, design);
-    let lengths: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
-    for (column, length) in lengths.iter().enumerate() {
-        if *length == 0.0 {
-            return Err(LeastSquaresError::Dependent { column });
-        }
-        matrix.column_mut(column).unscale_mut(*length);
-    }
-    let qr = matrix.qr();
-    let r = qr.r();
-    if let Some(column) = (0..columns).find(|&i| r[(i, i)].abs() < RANK_TOLERANCE) {
-        return Err(LeastSquaresError::Dependent { column });
-    }
-    let rotated = rotated(&qr, columns, observed);
-    let r_inverse = r
-        .solve_upper_triangular(&DMatrix::identity(columns, columns))
-        .expect("the diagonal of R was just found away from zero");
-    let scaled = &r_inverse * rotated;
-    let scaled_cofactor = &r_inverse * r_inverse.transpose();
-    let coefficients: Vec<f64> = (0..columns).map(|i| scaled[i] / lengths[i]).collect();
-    let cofactor = (0..columns * columns)
-        .map(|k| (k / columns, k % columns))
-        .map(|(i, j)| scaled_cofactor[(i, j)] / (lengths[i] * lengths[j]))
-        .collect();
-    let residuals = residuals(design, columns, observed, &coefficients);
-    Ok(Fit {
-        coefficients,
-        cofactor,
-        residuals,
-        degrees_of_freedom: rows - columns,
-    })
+    Decomposed::new(design, columns, observed)?.fit()
 }
 
-/// The same where some combinations of coefficients make nothing of the observations: these are left at
-/// nothing, and count neither as coefficients nor as uncertain (singular values; Moore and Penrose).
-///
-/// # Errors
-/// As [`solve`], but for coefficients that cannot be distinguished.
-pub(crate) fn solve_what_is_told(
-    design: &[f64],
-    columns: usize,
-    observed: &[f64],
-) -> Result<Fit, LeastSquaresError> {
-    check(design, columns, observed)?;
-    let rows = observed.len();
-    let mut matrix = DMatrix::from_row_slice(rows, columns, design);
-    let lengths: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
-    for (column, length) in lengths.iter().enumerate() {
-        matrix
-            .column_mut(column)
-            .unscale_mut(length.max(f64::MIN_POSITIVE));
-    }
-    let qr = matrix.qr();
-    let rotated = rotated(&qr, columns, observed);
-    let svd = qr.r().svd(true, true);
-    let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
-    let largest = svd.singular_values.max();
-    let told: Vec<usize> = (0..columns)
-        .filter(|at| svd.singular_values[*at] > TOLD_SHARE * largest)
-        .collect();
-    let mut scaled = DVector::zeros(columns);
-    let mut scaled_cofactor = DMatrix::zeros(columns, columns);
-    for at in &told {
-        let own = v_t.row(*at).transpose();
-        let value = svd.singular_values[*at];
-        scaled += &own * (u.column(*at).dot(&rotated) / value);
-        scaled_cofactor += &own * own.transpose() / (value * value);
-    }
-    let unscaled = |at: usize| 1.0 / lengths[at].max(f64::MIN_POSITIVE);
-    let is_there = |at: usize| lengths[at] > 0.0;
-    let coefficients: Vec<f64> = (0..columns)
-        .map(|at| {
-            if is_there(at) {
-                scaled[at] * unscaled(at)
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    let cofactor = (0..columns * columns).map(|k| {
-        let (i, j) = (k / columns, k % columns);
-        let is_there = is_there(i) && is_there(j);
-        if is_there {
-            scaled_cofactor[(i, j)] * unscaled(i) * unscaled(j)
-        } else {
-            0.0
+/// A problem that was brought to a triangle: what takes most of the time, whatever is asked of it then.
+pub(crate) struct Decomposed<'a> {
+    design: &'a [f64],
+    observed: &'a [f64],
+    /// Of the columns, by which they were divided where they are not zero.
+    lengths: Vec<f64>,
+    r: DMatrix<f64>,
+    /// Qᵀ times the observations, as many of it as there are columns.
+    rotated: DVector<f64>,
+}
+
+impl<'a> Decomposed<'a> {
+    /// # Errors
+    /// As [`solve`], but for coefficients that cannot be distinguished.
+    pub(crate) fn new(
+        design: &'a [f64],
+        columns: usize,
+        observed: &'a [f64],
+    ) -> Result<Self, LeastSquaresError> {
+        check(design, columns, observed)?;
+        let mut matrix = DMatrix::from_row_slice(observed.len(), columns, design);
+        let lengths: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
+        for (column, length) in lengths.iter().enumerate() {
+            matrix
+                .column_mut(column)
+                .unscale_mut(length.max(f64::MIN_POSITIVE));
         }
-    });
-    Ok(Fit {
-        cofactor: cofactor.collect(),
-        residuals: residuals(design, columns, observed, &coefficients),
-        coefficients,
-        degrees_of_freedom: rows - told.len(),
-    })
+        let qr = matrix.qr();
+        Ok(Self {
+            design,
+            observed,
+            lengths,
+            rotated: rotated(&qr, columns, observed),
+            r: qr.r(),
+        })
+    }
+
+    /// All coefficients.
+    ///
+    /// # Errors
+    /// When one cannot be distinguished from the others.
+    pub(crate) fn fit(&self) -> Result<Fit, LeastSquaresError> {
+        let columns = self.lengths.len();
+        let is_dependent = |i: &usize| self.r[(*i, *i)].abs() < RANK_TOLERANCE;
+        let nothing = self.lengths.iter().position(|it| *it == 0.0);
+        if let Some(column) = nothing.or_else(|| (0..columns).find(is_dependent)) {
+            return Err(LeastSquaresError::Dependent { column });
+        }
+        let r_inverse = upper_inverse(&self.r);
+        let scaled = &r_inverse * &self.rotated;
+        let scaled_cofactor = &r_inverse * r_inverse.transpose();
+        let lengths = &self.lengths;
+        let coefficients: Vec<f64> = (0..columns).map(|i| scaled[i] / lengths[i]).collect();
+        let cofactor = (0..columns * columns)
+            .map(|k| (k / columns, k % columns))
+            .map(|(i, j)| scaled_cofactor[(i, j)] / (lengths[i] * lengths[j]))
+            .collect();
+        Ok(Fit {
+            residuals: residuals(self.design, columns, self.observed, &coefficients),
+            coefficients,
+            cofactor,
+            degrees_of_freedom: self.observed.len() - columns,
+        })
+    }
+
+    /// The same where some combinations of coefficients make nothing of the observations: these are left at
+    /// nothing, and count neither as coefficients nor as uncertain (singular values; Moore and Penrose).
+    pub(crate) fn fit_of_what_is_told(&self) -> Fit {
+        let columns = self.lengths.len();
+        let svd = self.r.clone().svd(true, true);
+        let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+        let largest = svd.singular_values.max();
+        let told: Vec<usize> = (0..columns)
+            .filter(|at| svd.singular_values[*at] > TOLD_SHARE * largest)
+            .collect();
+        let mut scaled = DVector::zeros(columns);
+        let mut scaled_cofactor = DMatrix::zeros(columns, columns);
+        for at in &told {
+            let own = v_t.row(*at).transpose();
+            let value = svd.singular_values[*at];
+            scaled += &own * (u.column(*at).dot(&self.rotated) / value);
+            scaled_cofactor += &own * own.transpose() / (value * value);
+        }
+        let is_there = |at: usize| self.lengths[at] > 0.0;
+        let unscaled = |at: usize| 1.0 / self.lengths[at].max(f64::MIN_POSITIVE);
+        let coefficient = |at: usize| match is_there(at) {
+            true => scaled[at] * unscaled(at),
+            false => 0.0,
+        };
+        let coefficients: Vec<f64> = (0..columns).map(coefficient).collect();
+        let cofactor = (0..columns * columns).map(|k| {
+            let (i, j) = (k / columns, k % columns);
+            match is_there(i) && is_there(j) {
+                true => scaled_cofactor[(i, j)] * unscaled(i) * unscaled(j),
+                false => 0.0,
+            }
+        });
+        Fit {
+            cofactor: cofactor.collect(),
+            residuals: residuals(self.design, columns, self.observed, &coefficients),
+            coefficients,
+            degrees_of_freedom: self.observed.len() - told.len(),
+        }
+    }
+}
+
+/// Of a triangle without a zero on its diagonal; of each column only what is not zero is solved for.
+fn upper_inverse(r: &DMatrix<f64>) -> DMatrix<f64> {
+    let columns = r.ncols();
+    let mut inverse = DMatrix::identity(columns, columns);
+    for at in 0..columns {
+        let mut own = inverse.view_mut((0, at), (at + 1, 1));
+        r.view((0, 0), (at + 1, at + 1))
+            .solve_upper_triangular_mut(&mut own);
+    }
+    inverse
 }
 
 /// Qᵀ times the observations, as many of it as there are columns. Q itself is never formed: it would take as long

@@ -3,7 +3,7 @@
 
 use units::portable::ln;
 
-use crate::least_squares::{self, Fit, LeastSquaresError};
+use crate::least_squares::{self, Decomposed, Fit, LeastSquaresError};
 use crate::volumetric::identify::between::Extent;
 use crate::volumetric::identify::design::Design;
 use crate::volumetric::identify::scatter::scatter_limit;
@@ -122,10 +122,11 @@ fn solve(design: &Design, extra: &[Vec<f64>]) -> Result<Fit, LeastSquaresError> 
         })
         .collect();
     let all = columns + extra.len();
-    match least_squares::solve(&rows, all, &design.values) {
+    let decomposed = Decomposed::new(&rows, all, &design.values)?;
+    match decomposed.fit() {
         // Unknowns that are looked for must be told; those of the errors need not be.
         Err(LeastSquaresError::Dependent { column }) if column < columns => {
-            least_squares::solve_what_is_told(&rows, all, &design.values)
+            Ok(decomposed.fit_of_what_is_told())
         }
         solved => solved,
     }
