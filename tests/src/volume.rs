@@ -430,6 +430,22 @@ impl Volume {
         (mover, state)
     }
 
+    /// What a move to `target` states of its tool, with errors that a perfect calibration would find and no guide that bends.
+    ///
+    /// # Panics
+    /// When it does not get there.
+    pub fn stated_without_bends(&mut self, target: [f64; 3]) -> Off {
+        self.know_errors();
+        let store = self.bench.store.clone();
+        good(self.work().reference(&store));
+        let (_, mut state) = self.corrected();
+        state.bends.clear();
+        let (mut mover, _) = self.corrected_by(state);
+        let rest = Duration::from_millis(200);
+        let live = good(self.work().drive_to(&mut mover, point_mm(target), rest));
+        core::array::from_fn(|k| live.uncertainty[k])
+    }
+
     /// Brings the tool to each place, stands there and says by how much it is off; `along` gets
     /// what is off on the way at some set-points, as if the drives were there already.
     pub fn visit(

@@ -1,9 +1,7 @@
 //! What a thermometer does not know is in the uncertainty that a move states: its own standard uncertainty times what a kelvin
 //! does to the place.
 
-use core::time::Duration;
-
-use tests::volume::{Volume, calm, good, point_mm};
+use tests::volume::{Volume, calm, good};
 use tests::{Bench, Edit};
 use truestage::{CalibrateOptions, Failure};
 use units::{Approach, Metres};
@@ -66,16 +64,7 @@ fn stated_of_three(u_kelvin: f64, target: [f64; 3]) -> [Metres; 3] {
         let known = format!("standard_uncertainty_k = {u_kelvin}");
         calm(text.edit("standard_uncertainty_k = 0.01", &known))
     };
-    let mut volume = Volume::zeroed(12, machine, |text| text);
-    volume.know_errors();
-    let store = volume.bench.store.clone();
-    good(volume.work().reference(&store));
-    let (_, mut state) = volume.corrected();
-    state.bends.clear();
-    let (mut mover, _) = volume.corrected_by(state);
-    let rest = Duration::from_millis(200);
-    let live = good(volume.work().drive_to(&mut mover, point_mm(target), rest));
-    core::array::from_fn(|k| live.uncertainty[k])
+    Volume::zeroed(12, machine, |text| text).stated_without_bends(target)
 }
 
 /// Two thermometers of each scale, 5 ppm/K each.

@@ -1,13 +1,12 @@
 //! Three axes whose thermometers have certificates: what these correct is in what a calibration keeps, what they are
 //! unsure of is in what a move states, and nothing is measured with one that has expired.
 
-use core::time::Duration;
 use std::path::Path;
 
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::Edit;
 use tests::certificate::{Certificate, day_from_now};
-use tests::volume::{GEOMETRY, Volume, calm, good, point_mm, quick};
+use tests::volume::{GEOMETRY, Volume, calm, good, quick};
 use truestage::volumetric::{GeometryContent, VerifyBy, WarmUp};
 use units::Metres;
 
@@ -83,16 +82,7 @@ fn what_a_thermometer_shows_too_much_its_certificate_takes_out_of_the_record() {
 fn stated(u: f64, target: [f64; 3]) -> Metres {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let machine = |text: String| calm(with(&text, folder.path(), &certificate(0.0, u)));
-    let mut volume = Volume::zeroed(15, machine, |text| text);
-    volume.know_errors();
-    let store = volume.bench.store.clone();
-    good(volume.work().reference(&store));
-    let (_, mut state) = volume.corrected();
-    state.bends.clear();
-    let (mut mover, _) = volume.corrected_by(state);
-    let rest = Duration::from_millis(200);
-    let live = good(volume.work().drive_to(&mut mover, point_mm(target), rest));
-    live.uncertainty[0]
+    Volume::zeroed(15, machine, |text| text).stated_without_bends(target)[0]
 }
 
 /// 5 ppm/K over 400 mm.
