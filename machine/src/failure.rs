@@ -209,6 +209,14 @@ impl Failure {
         }
     }
 
+    /// Whether it is what ends a procedure that was asked to end, by whatever signal or program.
+    pub const fn is_stop(&self) -> bool {
+        match self {
+            Self::HeldUp { failure, .. } => failure.is_stop(),
+            other => matches!(other, Self::Interrupted | Self::Terminated { .. }),
+        }
+    }
+
     /// The exit code: 2 usage or configuration, 3 refused for safety, 4 device or bus, 128 and the
     /// signal's number (130 for Ctrl-C, 143 for SIGTERM) when it was stopped on request.
     pub const fn exit_code(&self) -> u8 {

@@ -15,8 +15,8 @@ impl Failure {
     /// Whether it is what ends a procedure that was asked to end.
     pub fn is_stop(&self) -> bool {
         match self {
-            Self::Machine(machine::Failure::Interrupted) => true,
-            Self::Resumable { source, .. } => source.is_stop(),
+            Self::Machine(failure) => failure.is_stop(),
+            Self::Resumable { source, .. } | Self::BeforeZero { source, .. } => source.is_stop(),
             _ => false,
         }
     }
@@ -99,6 +99,30 @@ mod tests {
         assert_eq!(failure.exit_code(), exit_code, "{failure}");
     }
 
+    fn resumable(stopped: machine::Failure) -> Failure {
+        Failure::Resumable {
+            source: Box::new(stopped.into()),
+            journal: "run.jsonl".into(),
+        }
+    }
+
+    #[test]
+    fn whatever_signal_stopped_it_is_a_stop_and_its_exit_code_says_which() {
+        for (signal, exit_code) in [(1, 129), (2, 130), (15, 143)] {
+            let stopped = || match signal {
+                2 => machine::Failure::Interrupted,
+                signal => machine::Failure::Terminated { signal },
+            };
+            for failure in [Failure::Machine(stopped()), resumable(stopped())] {
+                assert!(failure.is_stop(), "signal {signal}: {failure}");
+                assert!(!failure.stops_the_machine(), "signal {signal}: {failure}");
+                check(failure, exit_code);
+            }
+        }
+        let other = machine::Failure::NotZeroed { axis: "x".into() };
+        assert!(!Failure::from(other).is_stop());
+    }
+
     #[test]
     fn the_exit_code_says_whose_turn_it_is() {
         let id = || "abc".to_owned();
@@ -121,11 +145,7 @@ mod tests {
             Failure::Machine(machine::Failure::Terminated { signal: 15 }),
             143,
         );
-        let (source, journal) = (
-            Box::new(Failure::Machine(machine::Failure::Interrupted)),
-            "run.jsonl".into(),
-        );
-        check(Failure::Resumable { source, journal }, 130);
+        check(resumable(machine::Failure::Interrupted), 130);
         let (seen, limit) = (Metres(2e-6), Metres(1e-6));
         let axis = id();
         check(Failure::OutOfTolerance { axis, seen, limit }, 5);

@@ -34,7 +34,7 @@ impl LinearStage<'_> {
             Ok(None)
         };
         match finding {
-            Err(Failure::Machine(stopped @ machine::Failure::Interrupted)) => stopped.into(),
+            Err(stopped) if stopped.is_stop() => stopped,
             Ok(Some(finding)) => Failure::PatternElsewhere {
                 axis,
                 finding: Box::new(finding),

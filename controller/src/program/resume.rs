@@ -46,10 +46,7 @@ pub(crate) fn resumable<R>(
 ) -> Result<R, Failure> {
     let before = store.newest_run(verb, axis)?;
     run().map_err(|failure| {
-        let is_asked = matches!(
-            failure,
-            Failure::Machine(machine::Failure::Interrupted | machine::Failure::Terminated { .. })
-        );
+        let is_asked = matches!(&failure, Failure::Machine(failure) if failure.is_stop());
         let begun = || {
             store
                 .newest_run(verb, axis)

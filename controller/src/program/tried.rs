@@ -58,13 +58,16 @@ pub(crate) fn tried(
 
 /// How a verification ended that did not come to figures of a good calibration.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Cut {
+pub(crate) enum Cut {
     /// Somebody stopped it; where what it measured is kept.
     Stopped(Option<PathBuf>),
     Failed,
     /// It shows that the calibration makes the machine worse.
     Worse,
 }
+
+/// Commands, and what they do.
+type Next = Vec<(String, &'static str)>;
 
 impl Made {
     /// What is told of it when its verification ended by `failure`, which is told less what it says of going on: it is
@@ -74,9 +77,7 @@ impl Made {
             Failure::Resumable { source, journal } => (*source, Some(journal)),
             other => (other, None),
         };
-        // 128 and the signal's number: somebody asked for it.
-        let is_stopped = failure.exit_code() >= 128;
-        let cut = match (is_stopped, failure.tells_worse()) {
+        let cut = match (failure.is_stop(), failure.tells_worse()) {
             (true, _) => Cut::Stopped(journal),
             (false, true) => Cut::Worse,
             (false, false) => Cut::Failed,
@@ -87,14 +88,20 @@ impl Made {
     }
 
     /// What is stored, whether it is used, and what to do next.
-    fn standing(self, cut: &Cut, of: (&Path, Option<&str>)) -> Told {
+    pub(crate) fn standing(self, cut: &Cut, of: (&Path, Option<&str>)) -> Told {
         let is_used = |(pointer, id): &(String, String)| {
             let active = self.store.active(pointer).ok();
             active.and_then(|it| it.current).as_ref() == Some(id)
         };
         let used: Vec<bool> = self.stored.iter().map(is_used).collect();
         let is_in_use = used.iter().all(|it| *it);
-        let next = self.next(cut, is_in_use, of);
+        let next = match (cut, is_in_use) {
+            // Nobody is led to use it; what to look for is in the failure.
+            (Cut::Worse, _) => Vec::new(),
+            (Cut::Stopped(_) | Cut::Failed, false) => self.all_the_same(of),
+            (Cut::Stopped(journal), true) => self.verified_later(journal.is_some(), of),
+            (Cut::Failed, true) => self.verified_later(false, of),
+        };
         let mut told = self.told;
         told.text += match cut {
             Cut::Stopped(_) => "\nNOT VERIFIED: its verification was stopped",
@@ -136,35 +143,27 @@ impl Made {
         told
     }
 
-    /// Commands, and what they do.
-    fn next(
-        &self,
-        cut: &Cut,
-        is_in_use: bool,
-        (config, axis): (&Path, Option<&str>),
-    ) -> Vec<(String, &'static str)> {
-        // Nobody is led to use it; what to look for is in the failure.
-        if *cut == Cut::Worse {
-            return Vec::new();
-        }
-        let config = config.display();
-        let axis = axis.map_or(String::new(), |it| format!(" --axis {it}"));
-        let verify = format!("truestage verify {config}{axis}");
-        if !is_in_use {
-            let activated = self.stored.iter().filter(|it| self.is_chosen(it));
-            let activate = activated.map(|(_, id)| {
-                let command = format!("truestage cal activate {config} {}", short(id));
-                (command, "uses it all the same")
-            });
-            let again = (verify, "then verifies it again");
-            return activate.chain([again]).collect();
-        }
-        let mut next = vec![match cut {
-            Cut::Stopped(Some(_)) => (format!("{verify} --resume"), "goes on with that"),
-            Cut::Stopped(None) | Cut::Failed | Cut::Worse => (verify, "verifies it"),
+    /// How what is not used is used all the same, and verified.
+    fn all_the_same(&self, of: (&Path, Option<&str>)) -> Next {
+        let activated = self.stored.iter().filter(|it| self.is_chosen(it));
+        let activate = activated.map(|(_, id)| {
+            let command = format!("truestage cal activate {} {}", of.0.display(), short(id));
+            (command, "uses it all the same")
+        });
+        let again = (verify_of(of), "then verifies it again");
+        activate.chain([again]).collect()
+    }
+
+    /// How what is used is verified, going on with what that has measured or anew, and how to go back.
+    fn verified_later(&self, goes_on: bool, of: (&Path, Option<&str>)) -> Next {
+        let verify = verify_of(of);
+        let mut next = vec![match goes_on {
+            true => (format!("{verify} --resume"), "goes on with that"),
+            false => (verify, "verifies it"),
         }];
-        let all = self.stored.iter();
-        if all.clone().all(|it| self.store.earlier(&it.0).is_ok()) {
+        let mut all = self.stored.iter();
+        if all.all(|it| self.store.earlier(&it.0).is_ok()) {
+            let config = of.0.display();
             let back = format!("truestage cal rollback {config} --axis {}", self.group);
             next.push((back, "goes back to what was used before"));
         }
@@ -175,6 +174,11 @@ impl Made {
     fn is_chosen(&self, stored: &(String, String)) -> bool {
         stored.0 == self.group || self.stored.iter().all(|it| it.0 != self.group)
     }
+}
+
+fn verify_of((config, axis): (&Path, Option<&str>)) -> String {
+    let axis = axis.map_or(String::new(), |it| format!(" --axis {it}"));
+    format!("truestage verify {}{axis}", config.display())
 }
 
 /// Whether what was made is used, in the words of its kind: `what` is made ready.
