@@ -384,13 +384,7 @@ impl Kept {
             Err(_) if self.machine.stop_request().is_requested() => {}
             Ok(found) => {
                 self.load_courses();
-                let is_ending = self.machine.stop_request().is_requested();
-                let is_stopped = found.bad.as_ref().is_some_and(Failure::is_stop);
-                let mut keeper = self.keeper.borrow_mut();
-                match is_stopped && !is_ending {
-                    true => keeper.run_cut_short(&mut self.machine, id, found),
-                    false => keeper.run_done(id, found),
-                }
+                self.settle(id, found);
             }
             Err(failure) if failure.is_stop() => {
                 // What it found may be stored, and in use.
@@ -406,6 +400,25 @@ impl Kept {
                 let cause = cause_of(&failure);
                 self.keeper.borrow_mut().run_failed(id, &cause);
             }
+        }
+    }
+
+    /// What the run `id` found is shown, and the run ends as it was to end.
+    fn settle(&mut self, id: &str, mut found: Found) {
+        let mut keeper = self.keeper.borrow_mut();
+        let is_ending = self.machine.stop_request().is_requested();
+        match found.bad.take_if(|it| it.stops_the_machine()) {
+            Some(failure) => {
+                keeper.run_found(id, found);
+                drop(keeper);
+                if !is_ending {
+                    self.failed(failure);
+                }
+            }
+            None if !is_ending && found.bad.as_ref().is_some_and(Failure::is_stop) => {
+                keeper.run_cut_short(&mut self.machine, id, found);
+            }
+            None => keeper.run_done(id, found),
         }
     }
 

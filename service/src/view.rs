@@ -377,9 +377,24 @@ pub struct RunView {
     /// Why the result is a bad one, although it is one: out of tolerance.
     #[serde(default)]
     pub out_of_tolerance: Option<Cause>,
+    /// Calibrate: what it stored, also where its verification did not come to its end.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stored: Vec<StoredView>,
+    /// Calibrate: its verification shows that what was stored makes the machine worse.
+    #[serde(default)]
+    pub made_worse: bool,
     /// Where one that ended before its result has what it measured.
     #[serde(default)]
     pub journal: Option<String>,
+}
+
+/// A calibration that a run stored.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct StoredView {
+    /// What the store calls it: an axis, or what is kept of several together.
+    pub of: String,
+    /// Its name.
+    pub calibration: String,
 }
 
 /// What a run asks a person, and how that can be answered (`POST /v1/runs/{id}/answers`).
@@ -428,6 +443,8 @@ impl RunView {
             result: serde_json::Value::Null,
             told: None,
             out_of_tolerance: None,
+            stored: Vec::new(),
+            made_worse: false,
             journal: None,
         }
     }

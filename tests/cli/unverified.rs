@@ -1,12 +1,15 @@
 //! Calibrations whose verification does not come to its end.
 
+use std::collections::BTreeSet;
 use std::fs;
 
+use drivers::transport::lockstep::lend_hand;
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::{Edit, LINEAR, Shipped, UVW};
 
 use crate::programs::{Bench, live_rigs, text};
+use crate::serve::keep;
 
 /// How often `entry` is in journals of this verb.
 fn entries(bench: &Bench, verb: &str, entry: &str) -> usize {
@@ -85,4 +88,58 @@ fn the_screws_of_a_platform_whose_verification_is_stopped_are_told_and_verified_
             .edit("runs = 2", "runs = 1")
             .edit("poses = 20", "poses = 6")
     });
+}
+
+/// The same through a service, which does not go on with a verification but begins it anew.
+#[test]
+fn a_kept_calibration_whose_verification_is_stopped_is_told_and_verified_later() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        let service = keep(&bench);
+        let told = stopped(&bench, "point");
+        check(&bench, &told, 1);
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+/// What a calibration tells whose verification has lost the beam when two of its points were written.
+fn beam_lost(bench: &Bench) -> Value {
+    let mut process = bench.start(&["calibrate", "machine.toml", "--verify"]);
+    process.wait_until(|| entries(bench, "verify", "point") >= 2);
+    let blocked = "fault fault = { kind = \"beam_blocked\" }";
+    lend_hand(&bench.folder().join("clock"), blocked).expect("the machine has a beam");
+    process.end().with_code(4)
+}
+
+#[test]
+fn a_verification_that_fails_tells_the_same_with_a_service_and_without() {
+    for rig in live_rigs() {
+        let told = [false, true].map(|is_kept| {
+            let bench = Bench::new(rig);
+            let service = is_kept.then(|| keep(&bench));
+            let told = beam_lost(&bench);
+            drop(service);
+            let verification = &told["verification"];
+            assert_eq!(verification["ended"], "failed", "{told:#}");
+            let stored = &verification["stored"][0];
+            let path = bench.folder().join(text(&stored["path"]));
+            assert!(path.exists(), "{stored}");
+            assert_eq!(
+                (&stored["of"], &stored["in_use"]),
+                (&json!("x"), &json!(true))
+            );
+            assert_eq!(
+                verification["next"],
+                json!(["truestage verify machine.toml"])
+            );
+            told
+        });
+        let names = told.map(|it| {
+            let names = it.as_object().expect("an object").keys().cloned();
+            // What devices counted is known to who keeps them.
+            names.filter(|it| it != "counters").collect::<BTreeSet<_>>()
+        });
+        assert_eq!(names[0], names[1]);
+    }
 }

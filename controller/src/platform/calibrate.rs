@@ -85,6 +85,14 @@ pub struct PlatformCalibrated {
     pub is_in_use: bool,
 }
 
+impl PlatformCalibrated {
+    /// What the store calls each calibration, and its name.
+    pub(crate) fn stored(&self) -> Vec<(String, String)> {
+        let each = self.screws.iter();
+        each.map(|it| (it.axis.clone(), it.id.clone())).collect()
+    }
+}
+
 impl AlignmentPlatform<'_> {
     /// Measures every screw, fits its model, stores and activates all of them, and uses them
     /// from now on.

@@ -103,6 +103,7 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
             "journal": zeroed.journal,
         }),
         told: words.map(|it| (it.zeroed)(&zeroed)),
+        stored: Vec::new(),
         bad: None,
     })
 }
@@ -121,6 +122,7 @@ fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "journal": made.journal,
         }),
         told: words.map(|it| (it.calibrated)(&made)),
+        stored: made.stored(),
         bad: None,
     })
 }
@@ -142,6 +144,7 @@ fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "journal": verified.journal,
         }),
         told: words.map(|it| (it.verified)(&verified, compensated)),
+        stored: Vec::new(),
         bad: verified.out_of_tolerance().filter(|_| compensated),
     })
 }

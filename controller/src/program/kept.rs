@@ -3,6 +3,7 @@
 //! A verb first tries to take the machine. Whoever has it says in its lease where it can be asked; what is wrong
 //! with the command line itself has been refused by then.
 
+mod calibrated;
 mod jobs;
 mod motions;
 
@@ -20,7 +21,7 @@ use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
-use crate::program::{AskArgs, AxisArgs, CalibrateArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
+use crate::program::{AskArgs, AxisArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
 use crate::runs::Choice;
 use machine::{Observer as _, Stage, StopRequest};
 
@@ -66,35 +67,6 @@ impl Service {
         let request = json!({"axis": VOLUME});
         let run = self.run(Stage::Reference, request, None, waiting)?;
         tell(&run, output)
-    }
-
-    pub(crate) fn calibrate(
-        &self,
-        args: &CalibrateArgs,
-        asked: Vec<&'static Asked>,
-        output: Output,
-    ) -> Ended {
-        refuse(!args.readings.is_empty(), "--readings")?;
-        if args.resume.is_some() {
-            // The run goes on as it was asked for.
-            refuse(args.no_activate, "--no-activate with --resume")?;
-            refuse(args.verify, "--verify with --resume")?;
-            refuse(args.accept_drift, "--accept-drift with --resume")?;
-            refuse(args.warm_up_min.is_some(), "--warm-up-min with --resume")?;
-        }
-        let stop = self.prepare(&args.axis, output)?;
-        let request = json!({
-            "axis": args.axis.axis,
-            "accept_drift": args.accept_drift,
-            "warm_up_min": args.warm_up_min,
-            "aside": args.no_activate,
-            "verify": args.verify,
-        });
-        let resume = args.resume.as_deref();
-        let waiting = Waiting::of(&args.axis, &args.ask, &stop, output);
-        let waiting = waiting.who_asks(asked);
-        let run = self.run(Stage::Calibrate, request, resume, waiting)?;
-        told_of(&run, output)
     }
 
     pub(crate) fn verify(
@@ -169,15 +141,26 @@ impl Service {
         self.run(Stage::Zero, json!({"axis": axis}), None, waiting)
     }
 
-    /// Begins a run, or goes on with the one that is paused, and waits for its end; the service names runs as people
+    /// Begins a run, or goes on with the one that is paused, and waits for its result; the service names runs as people
     /// name their stages.
     fn run(
+        &self,
+        stage: Stage,
+        request: Value,
+        resume: Option<&Path>,
+        waiting: Waiting<'_>,
+    ) -> Result<Value, Failure> {
+        self.seen(stage, request, resume, waiting)?.good()
+    }
+
+    /// The same, with what is seen of it also where it has no result.
+    fn seen(
         &self,
         stage: Stage,
         mut request: Value,
         resume: Option<&Path>,
         waiting: Waiting<'_>,
-    ) -> Result<Value, Failure> {
+    ) -> Result<Seen, Failure> {
         if request["kind"].is_null() {
             request["kind"] = json!(stage.text());
         }
@@ -272,7 +255,7 @@ impl Service {
         ender: &str,
         (stop, output): (&StopRequest, Output),
         mut meanwhile: impl FnMut(&Value) -> Result<(), Failure>,
-    ) -> Result<Value, Failure> {
+    ) -> Result<Seen, Failure> {
         let mut is_heard = false;
         let mut trouble = None;
         let mut points = 0;
@@ -297,17 +280,16 @@ impl Service {
             if state.is_some_and(|it| ENDS.contains(&it)) {
                 say_last(&seen, output);
             }
-            match state {
-                Some("done") => return Ok(seen),
-                Some("stopped" | "paused") if trouble.is_some() => {
-                    return trouble.map_or(Ok(seen), Err);
-                }
-                Some("stopped") if is_ending => return Err(stop.failure().into()),
-                Some("paused") => return Err(paused(&seen, is_ending.then(|| stop.failure()))),
-                Some("stopped") => return Err(stopped(&seen)),
-                Some("failed" | "timed_out") => return Err(failed(&seen)),
-                _ => {}
-            }
+            let bad = match state {
+                Some("done") => None,
+                Some("stopped" | "paused") if trouble.is_some() => trouble,
+                Some("stopped") if is_ending => Some(stop.failure().into()),
+                Some("paused") => Some(paused(&seen, is_ending.then(|| stop.failure()))),
+                Some("stopped") => Some(stopped(&seen)),
+                Some("failed" | "timed_out") => Some(failed(&seen)),
+                _ => continue,
+            };
+            return Ok(Seen { last: seen, bad });
         }
     }
 
@@ -330,6 +312,20 @@ impl Service {
             "the service does not end it so: {refused}; everything is stopped instead, and what was measured is kept"
         ));
         Ok(ask_on(&self.at, "POST", STOP, "{}").is_ok())
+    }
+}
+
+/// How a run or a motion ended.
+struct Seen {
+    /// What the service said of it last.
+    last: Value,
+    /// Why it has no result.
+    bad: Option<Failure>,
+}
+
+impl Seen {
+    fn good(self) -> Result<Value, Failure> {
+        self.bad.map_or(Ok(self.last), Err)
     }
 }
 
@@ -456,14 +452,16 @@ fn tell(ended: &Value, output: Output) -> Ended {
 
 /// What a run gave, and why that is a bad result, if it is.
 fn told_of(run: &Value, output: Output) -> Ended {
-    let Some(exit_code) = exit_code_of(&run["out_of_tolerance"]) else {
+    let Some(failure) = bad_result_of(run) else {
         return tell(run, output);
     };
-    let said = plain(
-        run["out_of_tolerance"]["cause"]
-            .as_str()
-            .unwrap_or_default(),
-    );
     let (text, value) = words_of(run);
-    output.bad_result(&text, value, Failure::Kept { said, exit_code })
+    output.bad_result(&text, value, failure)
+}
+
+fn bad_result_of(run: &Value) -> Option<Failure> {
+    let bad = &run["out_of_tolerance"];
+    let exit_code = exit_code_of(bad)?;
+    let said = plain(bad["cause"].as_str().unwrap_or_default());
+    Some(Failure::Kept { said, exit_code })
 }

@@ -170,7 +170,6 @@ impl Group {
             };
             match (self.runs.perform)(work, &self.name, &then) {
                 Ok(verified) => found.verified(verified),
-                Err(failure) if failure.stops_the_machine() => return Err(failure),
                 // What was stored is told, and why it is not verified, or not used.
                 Err(failure) => found.bad = Some(failure),
             }

@@ -151,6 +151,8 @@ pub struct Found {
     pub figures: Value,
     /// The same, as the command line prints it.
     pub told: Option<Told>,
+    /// The calibrations that it stored: what the store calls each, and its name.
+    pub stored: Vec<(String, String)>,
     /// Why the result is a bad one, although it is one.
     pub bad: Option<Failure>,
 }

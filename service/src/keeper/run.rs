@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use machine::{Machine, Stage};
 use serde_json::json;
+use truestage::Failure;
 use truestage::runs::{self, Found, Group};
 
 use super::mechanics::Mechanics;
@@ -19,7 +20,7 @@ use crate::order::Judged;
 use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::snapshot::CalibrationInUse;
-use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, ToldView};
+use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, StoredView, ToldView};
 
 /// So many runs are kept in the snapshot.
 const KEPT: usize = 64;
@@ -106,7 +107,12 @@ impl Run {
 fn show_found(view: &mut RunView, found: Found) {
     view.result = found.figures;
     view.told = found.told.map(ToldView::from);
+    view.made_worse = found.bad.as_ref().is_some_and(Failure::tells_worse);
     view.out_of_tolerance = found.bad.as_ref().map(cause_of);
+    let stored = found.stored.into_iter();
+    view.stored = stored
+        .map(|(of, calibration)| StoredView { of, calibration })
+        .collect();
 }
 
 /// What is done along it.
@@ -415,6 +421,11 @@ impl Keeper {
         });
     }
 
+    /// The run `id` has its result, and what ended its verification stops the machine: that ends it, too.
+    pub(crate) fn run_found(&mut self, id: &str, found: Found) {
+        self.change_run(id, |view| show_found(view, found));
+    }
+
     /// The run `id` has no result, and its axes stand.
     pub(crate) fn run_failed(&mut self, id: &str, cause: &Cause) {
         for seat in &mut self.seats {
@@ -460,7 +471,7 @@ impl Keeper {
         self.events.push("run", &id, data);
     }
 
-    fn change_run(&mut self, id: &str, change: impl FnOnce(&mut RunView)) {
+    pub(super) fn change_run(&mut self, id: &str, change: impl FnOnce(&mut RunView)) {
         let Ok(run) = self.runs.find(id) else {
             return;
         };

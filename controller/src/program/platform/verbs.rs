@@ -79,7 +79,6 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
     let run = |machine: &mut Machine, store: &Store| {
         let options = args.options(None);
         let calibrated = machine.platform()?.calibrate_by(store, &options)?;
-        let screws = calibrated.screws.iter();
         made = Some(Made {
             told: Told {
                 text: calibrated_text(&calibrated),
@@ -87,7 +86,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             },
             store: store.clone(),
             group: "platform".into(),
-            stored: screws.map(|it| (it.axis.clone(), it.id.clone())).collect(),
+            stored: calibrated.stored(),
         });
         if !args.verify {
             return Ok(None);

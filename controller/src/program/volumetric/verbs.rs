@@ -25,7 +25,7 @@ use crate::store::budget::PlacesBudgetRecord;
 use crate::volumetric::UnknownRecord;
 use crate::volumetric::motion::{NamedPoint, Ready};
 use crate::volumetric::verify::VolumetricVerified;
-use crate::volumetric::{GEOMETRY, REFERENCES, VerifyBy, VolumetricCalibrated, WarmUp};
+use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricCalibrated, WarmUp};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -110,10 +110,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
             },
             store: store.clone(),
             group: GEOMETRY.into(),
-            stored: vec![
-                (GEOMETRY.into(), calibrated.id.clone()),
-                (REFERENCES.into(), calibrated.references.clone()),
-            ],
+            stored: calibrated.stored(),
         });
         if !args.verify {
             return Ok(None);

@@ -63,7 +63,7 @@ use crate::volumetric::thermometers::Thermometry;
 use crate::volumetric::{
     AgreementRecord, UnknownRecord, VolumeLog, VolumePlanEntry, VolumeReferencesEntry,
 };
-use crate::volumetric::{GEOMETRY, VolumetricFailure};
+use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
 use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
@@ -128,6 +128,16 @@ pub struct VolumetricCalibrated {
     pub journal: PathBuf,
     /// Whether they are used from now on.
     pub is_in_use: bool,
+}
+
+impl VolumetricCalibrated {
+    /// What the store calls each calibration, and its name.
+    pub(crate) fn stored(&self) -> Vec<(String, String)> {
+        vec![
+            (GEOMETRY.into(), self.id.clone()),
+            (REFERENCES.into(), self.references.clone()),
+        ]
+    }
 }
 
 /// What is known of the machine when its lines are read.
