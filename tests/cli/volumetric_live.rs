@@ -25,7 +25,7 @@ use crate::programs::{
 
 /// A corner of the volume, few nodes and short averages: every verb works, and none takes long.
 /// What is late by some SYNC periods is no trouble.
-fn small(machine: &str) -> String {
+pub(crate) fn small(machine: &str) -> String {
     let changes = [
         ("sync_period_ms = 2.0", "sync_period_ms = 60.0"),
         ("every_syncs = 10", "every_syncs = 1"),
@@ -120,12 +120,22 @@ impl Live {
 
     /// Its output is for people.
     pub(crate) fn plain_command(&self, words: &[&str]) -> Command {
+        self.plain_command_by(words, Path::new("ask"))
+    }
+
+    /// The same, by the hand of the emulated machine, which sets up what it is asked for.
+    fn command_by_itself(&self, words: &[&str]) -> Command {
+        let hand = self.emulated.clock().expect("it has one");
+        self.plain_command_by(words, &hand)
+    }
+
+    fn plain_command_by(&self, words: &[&str], hand: &Path) -> Command {
         let mut command = Command::new(program("truestage"));
         command.current_dir(self.folder.path()).args(words);
         let clock = self.emulated.clock().expect("it has one");
         command.arg("--clock");
         command.arg(format!("lockstep:{}", clock.display()));
-        command.args(["--hand", "ask"]);
+        command.arg("--hand").arg(hand);
         for port in &self.ports {
             command.args(["--port", port]);
         }
@@ -250,6 +260,74 @@ fn three_axes_are_zeroed_calibrated_verified_and_moved_from_process_to_process()
         moves(&live);
         let departure = follows(&live);
         kept(&live, &geometry, &departure);
+    }
+}
+
+/// The names of what is in use.
+fn in_use(live: &Live) -> Vec<Value> {
+    let list = live
+        .run_nowhere(&["cal", "list", "machine.toml"])
+        .with_code(0);
+    let list = list["calibrations"].as_array().expect("a list").clone();
+    let active = list.into_iter().filter(|it| it["active"] == true);
+    active.map(|it| it["id"].clone()).collect()
+}
+
+#[test]
+fn three_axes_are_calibrated_and_verified_by_one_command_that_says_so_in_text_json_and_exit_code() {
+    for rig in live_rigs().filter(|rig| *rig == Rig::Pty) {
+        let live = Live::new(rig);
+        let words = ["calibrate", "machine.toml", "--verify"];
+        let made = Process::start(live.command_by_itself(&words).arg("--json")).end();
+        let made = made.with_code(0);
+        assert_eq!(
+            (&made["schema"], &made["verb"]),
+            (&1.into(), &"calibrate".into())
+        );
+        let verified = &made["verified"];
+        assert_eq!(verified["within_tolerance"], true, "{verified:#}");
+        let points = verified["points"].as_array().expect("a list");
+        assert_eq!(points.len(), 3, "{verified:#}");
+        let used = in_use(&live);
+        assert_eq!(used.len(), 2, "{used:?}");
+        for own in ["geometry", "references"] {
+            assert!(used.contains(&made[own]), "{own} of {made:#}");
+        }
+        let journal = live.path(&verified["journal"]);
+        let read = read_journal::<VolumeLog>(&journal).unwrap_or_else(|it| panic!("{it}"));
+        assert_eq!(
+            read.header.calibration.as_deref(),
+            made["geometry"].as_str()
+        );
+        assert!(read.complete);
+
+        // Nobody's machine is as good as that.
+        let strict = fs::read_to_string(live.folder.path().join("machine.toml"));
+        let strict = strict
+            .expect("it is there")
+            .edit("points = 3\nlimit_um = 3.0", "points = 3\nlimit_um = 0.001");
+        fs::write(live.folder.path().join("machine.toml"), strict).expect("there is room");
+        let ended = live.command_by_itself(&words).output();
+        let ended = ended.expect("it can be started");
+        assert_eq!(ended.status.code(), Some(5), "{ended:?}");
+        let told = String::from_utf8_lossy(&ended.stdout);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        for word in [
+            "errors ",
+            " are in use: ",
+            "deviations along the line: range",
+            "0.001 µm",
+        ] {
+            assert!(told.contains(word), "`{word}` is not in {told}");
+        }
+        assert!(said.contains("error: "), "{said}");
+        let used_then = in_use(&live);
+        assert!(
+            used_then.iter().all(|it| !used.contains(it)),
+            "{used_then:?}"
+        );
+        let name = used_then.iter().find(|it| told.contains(&text(it)[..12]));
+        assert!(name.is_some(), "{used_then:?}: {told}");
     }
 }
 
