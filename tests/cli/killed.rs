@@ -9,10 +9,11 @@ use drivers::transport::live::Live;
 use drivers::transport::lockstep::lend_hand;
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
-use tests::{Edit, Rig, random};
+use tests::{Edit, Rig, VOLUMETRIC, random};
 
 use crate::programs::{Bench, Process, live_rigs, number};
 use crate::serve::{ask, keep};
+use crate::volumetric_live::small;
 
 /// `watch_master_ms`, the heartbeat before it that was not sent any more, and what braking takes.
 const STOPPED_WITHIN: Duration = Duration::from_millis(500 + 100 + 100);
@@ -260,4 +261,52 @@ fn goes_on_to_its_end(bench: &Bench, left: &Value) {
     let ended = ended.expect("it comes to an end");
     assert_eq!(ended["state"], "done", "{ended}");
     assert_eq!(ended["result"]["journal"], left["journal"], "{ended}");
+}
+
+/// Which lines somebody was asked to set up.
+fn asked(said: &str) -> Vec<u32> {
+    let lines = said.lines().filter_map(|it| it.strip_prefix("> line "));
+    let numbers = lines.map(|it| it.split(' ').next().and_then(|it| it.parse().ok()));
+    numbers.map(|it| it.expect("a number")).collect()
+}
+
+/// The next service goes on behind the lines that were read cold, and whoever has it go on is told that the axes become warm
+/// again, and why.
+#[test]
+fn three_axes_whose_service_is_killed_while_they_become_warm_become_warm_again_with_the_next() {
+    for rig in live_rigs().filter(|rig| *rig == Rig::Pty) {
+        let bench = Bench::of(rig, VOLUMETRIC, |text| text);
+        bench.configure("machine.toml", |text| small(&text));
+        let service = keep(&bench);
+        let client = bench.start(&["calibrate", "machine.toml", "--warm-up-min", "0.5"]);
+        let ended = client.end_heard(|_, said| {
+            // The lines that are read cold are read: the axes go to and fro.
+            if said.contains("may be packed up") {
+                service.signal(Signal::SIGKILL);
+            }
+        });
+        assert_eq!(ended.code, Some(4), "{ended:?}");
+        assert_eq!(service.end().code, None);
+        let cold = asked(&ended.said);
+        // The drives miss the heartbeat, and stand.
+        Watcher::of(&bench).wait(Duration::from_secs(3));
+
+        let service = keep(&bench);
+        // They followed set-points, and have a fault since none comes.
+        let (status, reset) = ask(bench.folder(), "POST /v1/reset", &json!({}));
+        assert_eq!(status, 200, "{reset}");
+        let client = bench.start(&["calibrate", "machine.toml", "--resume"]);
+        let ended = client.end_heard(|client, said| {
+            if said.starts_with("> line ") {
+                client.signal(Signal::SIGINT);
+            }
+        });
+        assert_eq!(ended.code, Some(130), "{ended:?}");
+        let next = cold.last().map(|it| it + 1);
+        assert_eq!(asked(&ended.said).first().copied(), next, "{ended:?}");
+        let why = "no line was read warm before: the axes warm up for 0.5 min";
+        assert_eq!(ended.said.matches(why).count(), 1, "{ended:?}");
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
 }

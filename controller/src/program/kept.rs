@@ -4,6 +4,7 @@
 //! with the command line itself has been refused by then.
 
 mod calibrated;
+mod heard;
 mod jobs;
 mod motions;
 
@@ -23,6 +24,7 @@ use crate::program::progress::Bars;
 use crate::program::session::stop_on_signals;
 use crate::program::{AskArgs, AxisArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
 use crate::runs::Choice;
+use heard::Heard;
 use machine::{Observer as _, Stage, StopRequest};
 
 /// How long an answer is held back: Ctrl-C is looked for so often.
@@ -32,8 +34,6 @@ const WAIT: Duration = Duration::from_millis(200);
 const VOLUME: &str = "volume";
 /// What stops everything, and is taken from anybody.
 const STOP: &str = "/v1/stop";
-/// How runs and motions end, or wait for somebody to go on with them.
-const ENDS: [&str; 5] = ["done", "stopped", "paused", "failed", "timed_out"];
 
 /// Where the service is.
 pub(crate) struct Service {
@@ -189,24 +189,34 @@ impl Service {
             false => "abort",
         };
         let ender = format!("{path}/{ending}");
-        self.end_of(&path, &ender, (waiting.stop, waiting.output), |run| {
-            let of = |name: &str| run[name].as_u64().unwrap_or(0);
-            let axis = plain(run["of"].as_str().unwrap_or_default());
-            // The machine's clock is the service's.
-            bars.lives(Time::ZERO + begun.elapsed());
-            if of("steps") > 0 {
-                bars.progress(stage, &axis, of("steps_done"), of("steps"));
-            }
-            match &mut person {
-                Some(person) => self.answer(&path, run, person),
-                None => Ok(()),
-            }
-        })
+        self.end_of(
+            &path,
+            &ender,
+            (waiting.stop, waiting.output),
+            |run, heard| {
+                let of = |name: &str| run[name].as_u64().unwrap_or(0);
+                let axis = plain(run["of"].as_str().unwrap_or_default());
+                // The machine's clock is the service's.
+                bars.lives(Time::ZERO + begun.elapsed());
+                if of("steps") > 0 {
+                    bars.progress(stage, &axis, of("steps_done"), of("steps"));
+                }
+                match &mut person {
+                    Some(person) => self.answer(&path, run, (person, heard)),
+                    None => Ok(()),
+                }
+            },
+        )
     }
 
     /// Puts what the run at `path` asks to the person at this end, and passes his answer on.
-    fn answer(&self, path: &str, run: &Value, person: &mut Answering) -> Result<(), Failure> {
-        let Some((number, answer)) = person.look(&run["question"])? else {
+    fn answer(
+        &self,
+        path: &str,
+        run: &Value,
+        (person, heard): (&mut Answering, &Heard),
+    ) -> Result<(), Failure> {
+        let Some((number, answer)) = person.look(&heard.unheard(&run["question"]))? else {
             return Ok(());
         };
         let body = json!({"question": number, "answer": answer}).to_string();
@@ -254,11 +264,12 @@ impl Service {
         path: &str,
         ender: &str,
         (stop, output): (&StopRequest, Output),
-        mut meanwhile: impl FnMut(&Value) -> Result<(), Failure>,
+        mut meanwhile: impl FnMut(&Value, &Heard) -> Result<(), Failure>,
     ) -> Result<Seen, Failure> {
         let mut is_heard = false;
         let mut trouble = None;
         let mut points = 0;
+        let mut heard = Heard::default();
         loop {
             let is_ending = stop.is_requested() || trouble.is_some();
             if is_ending && !is_heard {
@@ -274,13 +285,10 @@ impl Service {
             let seen = ask_on(&self.at, "GET", &look, "")?;
             points += jobs::say_reached(&seen, output);
             if !is_ending {
-                trouble = meanwhile(&seen).err();
+                trouble = meanwhile(&seen, &heard).err();
             }
-            let state = seen["state"].as_str();
-            if state.is_some_and(|it| ENDS.contains(&it)) {
-                say_last(&seen, output);
-            }
-            let bad = match state {
+            heard.tell(&seen, output);
+            let bad = match seen["state"].as_str() {
                 Some("done") => None,
                 Some("stopped" | "paused") if trouble.is_some() => trouble,
                 Some("stopped") if is_ending => Some(stop.failure().into()),
@@ -326,13 +334,6 @@ struct Seen {
 impl Seen {
     fn good(self) -> Result<Value, Failure> {
         self.bad.map_or(Ok(self.last), Err)
-    }
-}
-
-/// What a person is told after the last question.
-fn say_last(run: &Value, output: Output) {
-    for text in run["said"].as_array().into_iter().flatten() {
-        output.note(&format!("> {}", plain(text.as_str().unwrap_or_default())));
     }
 }
 

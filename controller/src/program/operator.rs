@@ -326,6 +326,10 @@ impl LineOperator for Terminal {
             Answers::Keyboard(_) | Answers::Nobody => Ok(()),
         }
     }
+
+    fn tell(&mut self, text: &str) {
+        self.output.note(&format!("> {text}"));
+    }
 }
 
 /// How an emulated machine's hand is told to set a line up.

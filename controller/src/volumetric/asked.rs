@@ -27,6 +27,10 @@ impl LineOperator for Asking<'_> {
             .tell("the interferometer is no longer needed and may be packed up");
         Ok(())
     }
+
+    fn tell(&mut self, text: &str) {
+        self.0.tell(text);
+    }
 }
 
 /// A line as it is asked for, for programs.

@@ -180,6 +180,7 @@ impl Keeper {
         self.events.set_now(machine.now());
         self.take_notes();
         self.take_reached();
+        self.show_said();
         let asked = self.take_question(machine);
         for _ in 0..ORDERS_A_TICK {
             let Ok(letter) = self.inbox.try_recv() else {

@@ -77,6 +77,19 @@ impl Keeper {
         }
     }
 
+    /// What the person was told since the last question is part of the run as soon as it was.
+    pub(super) fn show_said(&mut self) {
+        let Some(run) = self.runs.running() else {
+            return;
+        };
+        let talk = self.talk.borrow();
+        if run.view.said.len() != talk.said.len() {
+            let (id, said) = (run.view.id.clone(), talk.said.clone());
+            drop(talk);
+            self.change_run(&id, |view| view.said = said);
+        }
+    }
+
     /// What was asked since the last tick becomes part of the run. What is to be done by hand is asked when everything
     /// else stands and is switched off, too.
     pub(super) fn take_question(&mut self, machine: &mut Machine) -> Result<(), machine::Failure> {

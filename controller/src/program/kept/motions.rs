@@ -105,7 +105,7 @@ impl Service {
     ) -> Result<Value, Failure> {
         let id = self.begin("/v1/motions", request)?;
         let path = format!("/v1/motions/{id}");
-        self.end_of(&path, STOP, (stop, output), |_| Ok(()))?
+        self.end_of(&path, STOP, (stop, output), |_, _| Ok(()))?
             .good()
     }
 }

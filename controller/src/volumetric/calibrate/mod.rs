@@ -71,7 +71,7 @@ use machine::Stage;
 use crate::volumetric::reference::mean::Noise;
 use known::Known;
 pub(crate) use warmth::minutes_of;
-use warmth::{is_as_warm, warm_up_of};
+use warmth::{Warmth, warm_up_of, warmth_left};
 
 /// What it is called where progress is told.
 const WHOLE: &str = "volume";
@@ -152,8 +152,8 @@ struct Session<'a> {
     end_noise: [Noise; 3],
     thermometry: Thermometry,
     operator: &'a mut dyn LineOperator,
-    /// Whether it is as warm as when it was interrupted among the lines that are read warm.
-    is_still_warm: bool,
+    /// Of a run that goes on: what is left of the warmth of the lines that were read warm.
+    warmth: Option<Warmth>,
     /// All lines, as in the plan.
     lines: Vec<StandardLine>,
     /// What was read up to now.
@@ -279,7 +279,8 @@ impl WorkVolume<'_> {
         journal: &mut Journal<VolumeLog>,
     ) -> Result<(), Failure> {
         let total = session.lines.len();
-        let mut is_warm = session.is_still_warm;
+        let mut is_warm = session.warmth == Some(Warmth::Left);
+        session.tell_warmth(warm_up);
         for at in 0..total {
             self.core
                 .observer()
@@ -314,11 +315,12 @@ impl WorkVolume<'_> {
         let own = config.calibrate.clone();
         let own = own.ok_or(VolumetricFailure::NotConfigured { section })?;
         let taken = self.take_references()?;
-        let mut is_still_warm = false;
+        let mut warmth = None;
         let entry = match read.references.take() {
             Some(kept) => {
                 self.still_holds(&config, &own, &read, &kept, &taken)?;
-                is_still_warm = is_as_warm(&read, &kept.temperatures_c, &taken.temperatures);
+                let left = warmth_left(&read, &kept.temperatures_c, &taken.temperatures);
+                warmth = Some(left);
                 kept
             }
             None => {
@@ -357,7 +359,7 @@ impl WorkVolume<'_> {
             end_noise: Default::default(),
             thermometry,
             operator,
-            is_still_warm,
+            warmth,
             lines,
             read,
         })
@@ -450,6 +452,16 @@ fn void_lines(lines: &[usize], journal: &mut Journal<VolumeLog>) -> Result<(), F
 }
 
 impl Session<'_> {
+    /// Whether it warms up again, where a line is left that is read warm.
+    fn tell_warmth(&mut self, how: WarmUp) {
+        let is_left = |at| self.is_warm_line(at) && !self.read.is_whole(at);
+        if let Some(warmth) = self.warmth
+            && (0..self.lines.len()).any(is_left)
+        {
+            self.operator.tell(&warmth.text(how));
+        }
+    }
+
     fn is_warm_line(&self, at: usize) -> bool {
         let plan = self.read.plan.as_ref();
         plan.is_some_and(|it| it.lines[at].warm)

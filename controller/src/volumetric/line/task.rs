@@ -110,6 +110,11 @@ pub trait LineOperator {
     /// # Errors
     /// When nobody can be told.
     fn pack_up(&mut self) -> Result<(), Failure>;
+
+    /// Tells what needs no answer, where somebody reads it.
+    fn tell(&mut self, text: &str) {
+        let _ = text;
+    }
 }
 
 #[cfg(test)]
