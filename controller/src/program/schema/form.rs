@@ -55,23 +55,25 @@ pub(crate) struct Printed {
     pub(crate) parts: Vec<(&'static str, Shape)>,
 }
 
+/// What every failure has, by name.
+pub(super) fn of_failures() -> [(&'static str, Shape); 2] {
+    [
+        ("error", text().about("What went wrong, for an operator.")),
+        (
+            "exit-code",
+            whole().about("What the program ends with; `truestage explain CODE` says more."),
+        ),
+    ]
+}
+
 /// The members of every failure.
 pub(super) fn failure() -> [Member; 2] {
-    let [error, exit_code] = failure_shapes();
-    [("error", error), ("exit_code", exit_code)]
+    [("error", part("error")), ("exit_code", part("exit-code"))]
 }
 
 /// The same beside a result, which need not be a bad one.
 pub(super) fn failure_beside() -> [Member; 2] {
-    let [error, exit_code] = failure_shapes();
-    [("error?", error), ("exit_code?", exit_code)]
-}
-
-fn failure_shapes() -> [Shape; 2] {
-    [
-        text().about("What went wrong, for an operator."),
-        whole().about("What the program ends with; `truestage explain CODE` says more."),
-    ]
+    [("error?", part("error")), ("exit_code?", part("exit-code"))]
 }
 
 /// What devices counted on the way.

@@ -14,7 +14,7 @@ use clap::{ArgMatches, Command, Subcommand};
 use serde_json::{Map, Value, json};
 
 use self::form::{Form, Printed, failure, failure_beside};
-use self::shape::{Member, constant, list, object, part};
+use self::shape::{Member, constant, list, object, part, text};
 use crate::config;
 use crate::program::kind::KINDS;
 use crate::program::output::{Ended, NO_VERB, Output, SCHEMA};
@@ -109,6 +109,7 @@ fn document(program: &Command) -> Value {
         .into_iter()
         .map(|(name, shape)| (name.to_owned(), shape.schema()))
         .collect();
+    parts.insert("failure".into(), failed());
     let mut choices = Vec::new();
     for verb in &verbs {
         let name = format!("verb-{}", verb.name.replace(' ', "-"));
@@ -131,17 +132,23 @@ fn document(program: &Command) -> Value {
 
 fn of_verb<'f>(verb: &Verb, forms: impl Iterator<Item = &'f Form>) -> Value {
     let forms = forms.map(|form| with_head(verb, form.what, form.members.clone(), form.is_judged));
-    let findings = list(part("finding")).about("Of a configuration that is not sound, each.");
-    let failed = failure()
-        .into_iter()
-        .chain([("findings?", findings)])
-        .collect();
-    let failed = with_head(verb, "a failure, and no result", failed, false);
     json!({
         "title": format!("truestage {}", verb.name).trim_end(),
         "description": verb.about,
-        "anyOf": forms.chain([failed]).collect::<Vec<_>>(),
+        // Of a failure, which is described once for all verbs, too.
+        "properties": {"verb": constant(verb.name.as_str()).schema()},
+        "anyOf": forms.chain([part("failure").schema()]).collect::<Vec<_>>(),
     })
+}
+
+/// What any verb prints that has no result.
+fn failed() -> Value {
+    let head = [("schema", constant(SCHEMA)), ("verb", text())];
+    let findings = list(part("finding")).about("Of a configuration that is not sound, each.");
+    let members = head.into_iter().chain(failure());
+    let mut schema = object(members.chain([("findings?", findings)])).schema();
+    schema["title"] = json!("a failure, and no result");
+    schema
 }
 
 /// An object of this form, with what every object says of itself.

@@ -1,6 +1,6 @@
 //! What is printed for machines of several kinds.
 
-use super::form::counters;
+use super::form::{counters, of_failures};
 use super::shape::{
     Member, Shape, and, anything, list, number, object, one_of, part, text, truth, whole, word,
 };
@@ -38,14 +38,16 @@ pub(crate) fn untold() -> Member {
 
 /// What several verbs print, by name.
 pub(super) fn all() -> Vec<(&'static str, Shape)> {
-    vec![
+    let mut all = Vec::from(of_failures());
+    all.extend([
         ("counters", counters()),
         ("finding", finding()),
         ("figures", all_figures()),
         ("contribution", contribution()),
         ("certificate", certificate()),
         ("verification", verification()),
-    ]
+    ]);
+    all
 }
 
 /// A verification that did not come to figures of a good calibration, and what is stored all the same.

@@ -61,6 +61,33 @@ fn what_is_described_once_is_used_and_is_there() {
     assert_eq!(used, defined);
 }
 
+/// How often an object below `schema` has a member of this name.
+fn count(schema: &Value, name: &str) -> usize {
+    match schema {
+        Value::Object(members) => {
+            let own = usize::from(members.contains_key(name));
+            own + members.values().map(|it| count(it, name)).sum::<usize>()
+        }
+        Value::Array(all) => all.iter().map(|it| count(it, name)).sum(),
+        _ => 0,
+    }
+}
+
+#[test]
+fn a_failure_is_described_once_and_each_verb_refers_to_it() {
+    let document = document(&Cli::command());
+    let defined = document["$defs"].as_object().expect("it has some");
+    let verbs = defined.iter().filter(|it| it.0.starts_with("verb"));
+    for (name, verb) in verbs {
+        let choices = verb["anyOf"].as_array().expect("it has choices");
+        assert_eq!(choices.last(), Some(&part("failure").schema()), "{name}");
+        assert!(verb["properties"]["verb"]["const"].is_string(), "{name}");
+    }
+    let failure = &document["$defs"]["failure"]["properties"];
+    assert!(failure.get("findings").is_some(), "{failure}");
+    assert_eq!(count(&document, "findings"), 1);
+}
+
 #[test]
 fn no_name_stands_for_two_things() {
     let parts = printed().parts;
