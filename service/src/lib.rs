@@ -44,5 +44,5 @@ pub use thread::{Opened, Service, StartError};
 pub use view::{
     AxisState, AxisView, CalibrationView, Cause, ChangeView, ChosenView, DepartureView, Event,
     GroupView, JournalView, LeaseView, Leased, LegView, MachineState, MachineView, MotionState,
-    MotionView, QuestionView, RunPlanView, RunState, RunView, Stopped, ToldView,
+    MotionView, QuestionView, RunPlanView, RunState, RunView, Stopped, StoredView, ToldView,
 };

@@ -7,8 +7,10 @@ use truestage::runs::JudgedPath;
 use utoipa::ToSchema;
 
 mod chosen;
+mod told;
 
 pub use chosen::{CalibrationView, ChangeView, ChosenView};
+pub use told::{StoredView, ToldView};
 
 use crate::problem::Code;
 use crate::quantity::Quantity;
@@ -388,15 +390,6 @@ pub struct RunView {
     pub journal: Option<String>,
 }
 
-/// A calibration that a run stored.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct StoredView {
-    /// What the store calls it: an axis, or what is kept of several together.
-    pub of: String,
-    /// Its name.
-    pub calibration: String,
-}
-
 /// What a run asks a person, and how that can be answered (`POST /v1/runs/{id}/answers`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct QuestionView {
@@ -456,23 +449,6 @@ impl RunView {
             members.remove("reached");
         }
         data
-    }
-}
-
-/// What something gave, as the command line prints it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct ToldView {
-    /// For people.
-    pub text: String,
-    /// For programs: what `--json` prints.
-    #[schema(value_type = Object)]
-    pub value: serde_json::Value,
-}
-
-impl From<truestage::runs::Told> for ToldView {
-    fn from(told: truestage::runs::Told) -> Self {
-        let truestage::runs::Told { text, value } = told;
-        Self { text, value }
     }
 }
 
