@@ -107,16 +107,19 @@ def of_zero(task):
 
 
 def of_now(task):
-    """The tool along x, y and z, d + turn × tool, of six errors with a covariance and of inputs by themselves."""
+    """The tool along x, y and z, d + turn × tool, of errors and coefficients with a covariance, and of inputs by themselves."""
     known = task["covariance"]
-    errors = [ureal(0, math.sqrt(known[k][k]), independent=False) for k in range(6)]
-    for i in range(6):
+    errors = [ureal(0, math.sqrt(own[k]), independent=False) for k, own in enumerate(known)]
+    for i in range(len(known)):
         for k in range(i):
             correlation = known[i][k] / math.sqrt(known[i][i] * known[k][k])
             set_correlation(correlation, errors[i], errors[k])
     tx, ty, tz = task["tool"]
-    dx, dy, dz, rx, ry, rz = errors
+    dx, dy, dz, rx, ry, rz, *coefficients = errors
     moved = [dx + ry * tz - rz * ty, dy + rz * tx - rx * tz, dz + rx * ty - ry * tx]
+    for k, warm in enumerate(task["warm"]):
+        for pull, coefficient in zip(warm, coefficients):
+            moved[k] = moved[k] + pull * coefficient
     for k, pulls in enumerate(task["pulls"]):
         for pull in pulls:
             moved[k] = moved[k] + ureal(0, abs(pull))

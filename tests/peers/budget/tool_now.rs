@@ -5,8 +5,8 @@ use compensator::budget::COVERAGE_FACTOR;
 use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{
-    Conditions, ErrorCovariance, Machine, Squareness, Thermal, ThermalBend, ThermalChannel,
-    VolumetricModel,
+    Coefficient, CoefficientCovariance, Conditions, ErrorCovariance, Machine, Squareness, Thermal,
+    ThermalBend, ThermalChannel, VolumetricModel,
 };
 use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point, Volume};
@@ -76,21 +76,42 @@ fn model(machine: Machine) -> VolumetricModel {
     VolumetricModel::new(machine, Limits { size, slope, rate }).expect("it can be compensated")
 }
 
-/// Of six errors that depend on each other: A·Aᵀ of a drawn A.
-fn covariance() -> [[f64; 6]; 6] {
+/// Six errors, then an expansion and a bend in units of their standard uncertainties.
+const TOGETHER: usize = 8;
+
+/// Of errors and coefficients that depend on each other: A·Aᵀ of a drawn A.
+fn covariance() -> [[f64; TOGETHER]; TOGETHER] {
     let state = &mut 5;
-    let sizes = [2e-7, 2e-7, 2e-7, 5e-7, 5e-7, 5e-7];
-    let a: [[f64; 6]; 6] = sizes.map(|size| [(); 6].map(|()| size * (2.0 * random(state) - 1.0)));
-    core::array::from_fn(|i| core::array::from_fn(|k| (0..6).map(|j| a[i][j] * a[k][j]).sum()))
+    let sizes = [2e-7, 2e-7, 2e-7, 5e-7, 5e-7, 5e-7, 1.0, 1.0];
+    let drawn = sizes.map(|size| [(); TOGETHER].map(|()| size * (2.0 * random(state) - 1.0)));
+    let mut a: [[f64; TOGETHER]; TOGETHER] = drawn;
+    for row in &mut a[6..] {
+        let size = row.iter().map(|it| it * it).sum::<f64>().sqrt();
+        row.iter_mut().for_each(|it| *it /= size);
+    }
+    let one = |i: usize, k: usize| (0..TOGETHER).map(|j| a[i][j] * a[k][j]).sum();
+    core::array::from_fn(|i| core::array::from_fn(|k| one(i, k)))
 }
 
 /// The same everywhere.
-fn known(of: &[[f64; 6]; 6]) -> ErrorCovariance {
-    let mut upper = (0..6).flat_map(|i| of[i][i..].to_vec());
+fn known(of: &[[f64; TOGETHER]; TOGETHER]) -> ErrorCovariance {
+    let mut upper = (0..6).flat_map(|i| of[i][i..6].to_vec());
     let place = core::array::from_fn(|_| upper.next().expect("21 entries"));
     let ends = [Metres(0.0), Metres(0.5)];
     let positions = core::array::from_fn(|_| ends.to_vec());
-    ErrorCovariance::new(positions, vec![place; 8]).expect("it is one")
+    let errors = ErrorCovariance::new(positions, vec![place; 8]).expect("it is one");
+    let with = |it: usize| core::array::from_fn(|k| of[it][k]);
+    let warmth = CoefficientCovariance {
+        coefficients: vec![
+            Coefficient::Expansion(Axis::X),
+            Coefficient::Bend(Axis::X, Axis::Z),
+        ],
+        correlations: vec![1.0, of[6][7], of[7][6], 1.0],
+        with_errors: vec![vec![with(6), with(7)]; 8],
+    };
+    errors
+        .with_coefficients(warmth)
+        .expect("they are of these errors")
 }
 
 const TOOL: Point = Point::from_mm(120.0, -40.0, -150.0);
@@ -109,7 +130,8 @@ fn now(model: &VolumetricModel, temperatures: [Celsius; 2], live: &MovingState) 
     now.expect("it is what the model was proven for")
 }
 
-/// By how much the tool goes with each independent input that is off by its standard uncertainty, along x, y and z.
+/// By how much the tool goes along x, y and z with each independent input that is off by its standard uncertainty; the last
+/// two are the expansion and the bend.
 fn pulls() -> [Vec<f64>; 3] {
     let usual = model(machine(0.0));
     let of = |model: &VolumetricModel, warm, live: &MovingState| {
@@ -183,10 +205,13 @@ fn gtc_comes_to_the_budget_of_three_axes_that_work_from_its_lines_and_from_what_
         "places": (0..3).map(combined).collect::<Vec<_>>(),
     }});
     let mut pulls = pulls();
+    let warm = pulls.each_mut().map(|it| it.split_off(it.len() - 2));
     // At y = 0.26 m, 0.15 of the interval from 0.2 to 0.6 m.
     pulls[2].push(between * 4.0 * 0.15 * 0.85);
     let tool = array(TOOL);
-    let task = json!({"of": "now", "covariance": covariance, "tool": tool, "pulls": pulls});
+    let task = json!({
+        "of": "now", "covariance": covariance, "tool": tool, "pulls": pulls, "warm": warm,
+    });
     let again = check_record(&kept, task);
     for (k, u) in stated.into_iter().enumerate() {
         assert_close("u of the tool", u, &again[k], u * SECOND_ORDER);

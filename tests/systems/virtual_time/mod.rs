@@ -32,6 +32,7 @@ mod volumetric_cause;
 mod volumetric_certified;
 mod volumetric_cold;
 mod volumetric_day;
+mod volumetric_errors;
 mod volumetric_kept;
 mod volumetric_kinds;
 mod volumetric_line;

@@ -78,18 +78,20 @@ struct Hour {
 
 /// What one day came to.
 #[derive(Default)]
-struct Day {
+pub(super) struct Day {
     hours: Vec<Hour>,
     /// At standstill, everywhere, all day.
-    at_rest: Vec<Off>,
+    pub(super) at_rest: Vec<Off>,
     /// At set-points on the way.
     along: Vec<Off>,
     /// Errors at standstill by the standard uncertainties stated for them, of each coordinate.
-    by_stated: Vec<f64>,
+    pub(super) by_stated: Vec<f64>,
     /// The readings of the calibration by what was stated of them.
     birge: Option<f64>,
     /// By contribution, its share of the variances stated, summed over coordinates.
     shares: BTreeMap<String, f64>,
+    /// By contribution, the variance that it is stated to make, summed over coordinates, square metres.
+    pub(super) variances: BTreeMap<String, f64>,
 }
 
 /// A day of a machine whose errors are known perfectly in the morning.
@@ -115,7 +117,12 @@ fn day_of_made(fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
 }
 
 /// The same, judged in `frame`; without it in that which fits the tables in the morning best.
-fn day_in(frame: Option<Frame>, fresh: impl Fn() -> Volume, seed: u64, places: usize) -> Day {
+pub(super) fn day_in(
+    frame: Option<Frame>,
+    fresh: impl Fn() -> Volume,
+    seed: u64,
+    places: usize,
+) -> Day {
     let (mut later, made) = Volume::calibrated(fresh, WARM_UP);
     tell_parts(&later, &made);
     if let Some(frame) = &frame {
@@ -143,7 +150,7 @@ fn day_in(frame: Option<Frame>, fresh: impl Fn() -> Volume, seed: u64, places: u
 }
 
 /// The frame that the tables of a machine that `fresh` makes count in on the morning of another day.
-fn frame_of(fresh: impl Fn() -> Volume) -> Frame {
+pub(super) fn frame_of(fresh: impl Fn() -> Volume) -> Frame {
     let (mut later, _) = Volume::calibrated(fresh, WARM_UP);
     let (_mover, state) = later.corrected();
     let everywhere = spread(0, 200);
@@ -218,6 +225,8 @@ impl Day {
             for (it, by) in budget.contributions().iter().zip(by) {
                 let share = (it.value * by / u).powi(2);
                 *self.shares.entry(it.name.clone()).or_default() += share;
+                let variance = (it.value * by).powi(2);
+                *self.variances.entry(it.name.clone()).or_default() += variance;
             }
         }
     }
@@ -418,35 +427,44 @@ const ROLL_REFERENCES_ARCSEC: f64 = 0.01;
 /// A laser whose errors are drawn from what is stated of them (one that repeats with each half wavelength is as good as
 /// chance from reading to reading, and does not average out), and detectors of roll on all three slides, with a tool on
 /// which each roll has a lever.
-fn as_stated(seed: u64) -> Volume {
+pub(super) fn as_stated(seed: u64) -> Volume {
+    let (air, dead_path_mm) = drawn_air(seed);
+    let laser = format!("nonlinearity_nm = 28.3\n{air}");
+    let detectors = |text: &str| rolls_as_stated(text, seed);
+    read_by(seed, (&laser, dead_path_mm), &detectors)
+}
+
+/// What the laser's sensors of air are off by, and its dead path in millimetres.
+pub(super) fn drawn_air(seed: u64) -> (String, f64) {
     let mut state = seed ^ 0x1A5E_7000;
-    let laser = format!(
-        "nonlinearity_nm = 28.3\nair_temperature_error_k = {}\npressure_error_hpa = {}\nhumidity_error_percent = {}",
+    let air = format!(
+        "air_temperature_error_k = {}\npressure_error_hpa = {}\nhumidity_error_percent = {}",
         0.1 * normal(&mut state),
         0.2 * normal(&mut state),
         3.0 * normal(&mut state),
     );
-    let detectors = |text: &str| rolls_as_stated(text, seed);
-    read_by(seed, (&laser, 50.0 + normal(&mut state)), &detectors)
+    (air, 50.0 + normal(&mut state))
 }
 
 /// The same machine with instruments that err in nothing but the noise of their channels, without which they would seem
 /// stuck.
-fn read_exactly(seed: u64) -> Volume {
-    let detectors = |text: &str| {
-        emulated_three_rolls(text)
-            .edit("turbulence_um = 0.1", "turbulence_um = 0.0")
-            .edit("translation_um = 0.2", "translation_um = 0.0")
-            .edit(
-                "radius_tolerance_percent = 1.0",
-                "radius_tolerance_percent = 0.0",
-            )
-    };
+pub(super) fn read_exactly(seed: u64) -> Volume {
+    let detectors = |text: &str| exact(&emulated_three_rolls(text));
     read_by(seed, ("noise_nm = 0.0", 50.0), &detectors)
 }
 
+/// An emulation whose beams err in nothing.
+pub(super) fn exact(text: &str) -> String {
+    text.edit("turbulence_um = 0.1", "turbulence_um = 0.0")
+        .edit("translation_um = 0.2", "translation_um = 0.0")
+        .edit(
+            "radius_tolerance_percent = 1.0",
+            "radius_tolerance_percent = 0.0",
+        )
+}
+
 /// A machine whose lines are read by a laser with a dead path of so many millimetres, and by `detectors`.
-fn read_by(
+pub(super) fn read_by(
     seed: u64,
     (laser, dead_path_mm): (&str, f64),
     detectors: &dyn Fn(&str) -> String,
@@ -459,7 +477,7 @@ fn read_by(
 }
 
 /// Three roll detectors whose volts per millimetre are off by as much as is stated.
-fn rolls_as_stated(text: &str, seed: u64) -> String {
+pub(super) fn rolls_as_stated(text: &str, seed: u64) -> String {
     let volts = 10.0 * (1.0 + 0.01 * normal(&mut (seed ^ 0x2011_0000)));
     let sensitivity = format!("sensitivity_v_per_mm = {volts}");
     emulated_three_rolls(text).edit("sensitivity_v_per_mm = 10.0", &sensitivity)
@@ -575,7 +593,16 @@ fn tell_parts(volume: &Volume, made: &VolumetricCalibrated) {
             .iter()
             .map(|place| (it.value * place.sensitivities[at] / place.u_si).powi(2));
         let share = shares.sum::<f64>() / budget.places.len() as f64;
-        eprintln!("  calibration: {:5.1} % {}", 100.0 * share, it.name);
+        let all = budget
+            .places
+            .iter()
+            .map(|place| (it.value * place.sensitivities[at]).powi(2));
+        let variance = 1e12 * all.sum::<f64>() / (3.0 * budget.places.len() as f64);
+        eprintln!(
+            "  calibration: {:5.1} % {variance:.5} um2 {}",
+            100.0 * share,
+            it.name
+        );
     }
 }
 

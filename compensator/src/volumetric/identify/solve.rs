@@ -11,7 +11,8 @@ use super::{Axis, IdentifyError, Observation, Plan, Point, Quantity, SquarenessN
 use crate::least_squares::{self, Fit};
 use crate::volumetric::function::{Function, FunctionError, Shape};
 use crate::volumetric::model::{
-    AxisErrors, COVARIANCE_ENTRIES, ErrorCovariance, ErrorName, Squareness,
+    AxisErrors, COVARIANCE_ENTRIES, Coefficient, CoefficientCovariance, ErrorCovariance, ErrorName,
+    Squareness,
 };
 
 /// One function found: values and uncertainties in SI units, metres or radians by its name.
@@ -117,17 +118,15 @@ impl Identified {
         Some(Point::new(u[0], u[1], u[2]))
     }
 
-    /// What functions and squarenesses have in common, at places on a grid whose `positions` along x, y and z are given;
-    /// what the functions do between their nodes is not in it. `None` when a place is outside the nodes.
+    /// What functions, squarenesses and thermal coefficients have in common, at places on a grid whose `positions` along
+    /// x, y and z are given; what the functions do between their nodes is not in it. `None` when a place is outside the
+    /// nodes.
     pub fn covariance(&self, positions: [Vec<Metres>; 3]) -> Option<ErrorCovariance> {
         let [of_x, of_y, of_z] = &positions;
         let mut places = Vec::new();
         for &x in of_x {
             for &y in of_y {
-                places.extend(
-                    of_z.iter()
-                        .map(|&z| self.covariance_at(Point::new(x, y, z))),
-                );
+                places.extend(of_z.iter().map(|&z| self.rows_at(Point::new(x, y, z))));
             }
         }
         let is_inside = |axis: Axis, it: &Metres| {
@@ -137,10 +136,13 @@ impl Identified {
         let mut each = Axis::ALL.into_iter().zip(&positions);
         let inside = each.all(|(axis, own)| own.iter().all(|it| is_inside(axis, it)));
         inside.then_some(())?;
-        ErrorCovariance::new(positions, places).ok()
+        let errors = places.iter().map(|rows| self.covariance_of(rows));
+        let errors = ErrorCovariance::new(positions, errors.collect()).ok()?;
+        errors.with_coefficients(self.coefficients(&places)).ok()
     }
 
-    fn covariance_at(&self, at: Point) -> [f64; COVARIANCE_ENTRIES] {
+    /// What each parameter makes of the tool's deviation along x, y and z and of its turn about them.
+    fn rows_at(&self, at: Point) -> [Vec<f64>; 6] {
         // The thermometers' references: what warmth does is uncertain by itself.
         let above = vec![0.0; self.plan.thermal.references.len()];
         let seen = |component: usize| {
@@ -156,7 +158,10 @@ impl Identified {
                 },
             )
         };
-        let rows: Vec<Vec<f64>> = (0..6).map(seen).collect();
+        core::array::from_fn(seen)
+    }
+
+    fn covariance_of(&self, rows: &[Vec<f64>; 6]) -> [f64; COVARIANCE_ENTRIES] {
         let columns = rows[0].len();
         let mut entries = [0.0; COVARIANCE_ENTRIES];
         let pairs = (0..6).flat_map(|i| (i..6).map(move |k| (i, k)));
@@ -167,6 +172,45 @@ impl Identified {
             *entry = rows[i].iter().zip(pulled).map(|(a, b)| a * b).sum();
         }
         entries
+    }
+
+    /// What the thermal coefficients have in common with each other, and with what `places` are the rows of.
+    fn coefficients(&self, places: &[[Vec<f64>; 6]]) -> CoefficientCovariance {
+        let expansions = self.expansions.iter();
+        let expansions = expansions.map(|it| Coefficient::Expansion(it.plan.axis));
+        let bends = self.bends.iter();
+        let bends = bends.map(|it| Coefficient::Bend(it.plan.axis, it.plan.towards));
+        let coefficients: Vec<Coefficient> = expansions.chain(bends).collect();
+        let count = coefficients.len();
+        let columns = self.covariance.len().isqrt();
+        // They are the last parameters.
+        let own = |at: usize| columns - count + at;
+        let between = |i: usize, k: usize| self.covariance[i * columns + k];
+        let size = |at: usize| between(own(at), own(at)).max(0.0).sqrt();
+        // What is known for certain has nothing in common with anything.
+        let shared = |value: f64, of: f64| if of > 0.0 { value / of } else { 0.0 };
+        let correlation = |i: usize, k: usize| {
+            if i == k {
+                return 1.0;
+            }
+            let (low, high) = (i.min(k), i.max(k));
+            shared(between(own(low), own(high)), size(low) * size(high)).clamp(-1.0, 1.0)
+        };
+        let pairs = (0..count).flat_map(|i| (0..count).map(move |k| (i, k)));
+        let with = |row: &Vec<f64>, at: usize| {
+            let each = row.iter().enumerate();
+            let sum = each.map(|(column, it)| it * between(column, own(at)));
+            shared(sum.sum(), size(at))
+        };
+        let with_errors = places.iter().map(|rows| {
+            let of_one = |at: usize| rows.each_ref().map(|row| with(row, at));
+            (0..count).map(of_one).collect()
+        });
+        CoefficientCovariance {
+            correlations: pairs.map(|(i, k)| correlation(i, k)).collect(),
+            with_errors: with_errors.collect(),
+            coefficients,
+        }
     }
 }
 

@@ -182,6 +182,56 @@ fn runs_cold_and_warm_tell_expansion_and_bending_with_the_errors_themselves() {
     }
 }
 
+/// Read cold and warm with noise: what the machine that works states of its tool, at every warmth, is what the fit does.
+#[test]
+fn a_machine_that_works_warm_states_what_errors_and_coefficients_are_uncertain_by_together() {
+    let mut chance = Chance(8);
+    let truth = warm_machine("FXYZ", &mut chance);
+    let session = Session::new(&truth, &[COLD, WARM], &mut chance, 1.0);
+    let found = session
+        .plan("FXYZ")
+        .identify(&session.observations)
+        .unwrap();
+    let mut machine = truth.machine().clone();
+    (machine.axes, machine.squareness) = (Default::default(), Default::default());
+    found.expansions[0].apply(&mut machine.thermal.channels);
+    machine.thermal.bends = vec![found.bends[0].thermal_bend(5.0, true)];
+    let places = [0.0, 0.2, 0.4, 0.6].map(Metres).to_vec();
+    let known = found.covariance([
+        places.clone(),
+        vec![Metres(0.0), Metres(0.1)],
+        vec![Metres(0.0), Metres(0.1)],
+    ]);
+    let model = model(machine).with_covariance(known);
+    let middle: [f64; 2] = core::array::from_fn(|it| (COLD[it] + WARM[it]) / 2.0);
+    let mut sums = Vec::new();
+    for warmth in [COLD, middle, WARM] {
+        let warmth = warmth.map(Celsius);
+        let now = model
+            .conditions(tool(), &warmth, &MovingState::default())
+            .unwrap();
+        let mut sum = 0.0;
+        for x in &places {
+            let at = Point::new(*x, Metres(0.0), Metres(0.0));
+            let stated = model.standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[]);
+            let expected = found.standard_uncertainty(at, tool(), &warmth).unwrap();
+            let between = expected.distance().value();
+            let stated = stated.unwrap().distance().value();
+            assert!(
+                (stated / between - 1.0).abs() < 1e-6,
+                "{stated} m, not {between} m"
+            );
+            sum += stated * stated;
+        }
+        sums.push(sum);
+    }
+    // Half-way both readings tell the tool.
+    assert!(
+        sums[1] < 0.7 * sums[0] && sums[1] < 0.7 * sums[2],
+        "{sums:?}"
+    );
+}
+
 /// A detector 60 mm ahead of its slide's zero sees 32 urad of tilt as 1.9 um, which is taken off readings
 /// along z.
 #[test]

@@ -38,6 +38,7 @@
 mod bound;
 mod chain;
 mod check;
+mod coefficients;
 mod covariance;
 mod errors;
 mod extreme;
@@ -49,6 +50,7 @@ mod uncertainty;
 use units::{Celsius, Metres, MetresPerSecond, Quantity, Radians};
 
 pub use chain::{Chain, ChainError};
+pub use coefficients::{Coefficient, CoefficientCovariance};
 pub use covariance::{CovarianceError, ENTRIES as COVARIANCE_ENTRIES, ErrorCovariance};
 pub use errors::{AxisErrors, ErrorName, Squareness};
 pub use extreme::Extreme;
@@ -102,7 +104,7 @@ pub struct Conditions {
     growth: V4,
     /// By axis and direction: the temperature difference that bends its guide.
     gradients: [V3; 3],
-    /// By axis: what the uncertainty of its expansion comes to, by magnitude.
+    /// By axis: what its expansion is off by when it is too large by its standard uncertainty; below zero where it is cold.
     u_expansion: V3,
 }
 
@@ -244,7 +246,7 @@ impl VolumetricModel {
             twist: [[0.0; 4]; 3],
             growth: wide(sums.growth),
             gradients: [[0.0; 3]; 3],
-            u_expansion: sums.u_expansion.map(f64::abs),
+            u_expansion: sums.u_expansion,
         };
         for (k, fixed) in fixed.into_iter().enumerate() {
             now.lean[k][k] += sums.expansion[k];

@@ -4,8 +4,9 @@ mod budget;
 
 use units::{Metres, Quantity, Radians};
 
+use super::coefficients::COEFFICIENTS_MAX;
 use super::thermal::ThermalSums;
-use super::{Conditions, Squareness, ThermalBend, VolumetricModel};
+use super::{Coefficient, Conditions, Squareness, ThermalBend, VolumetricModel};
 use crate::volumetric::function::Function;
 use crate::volumetric::point::{V3, add, cross};
 use crate::volumetric::{Axis, NoCorrection, Point};
@@ -13,7 +14,7 @@ use crate::volumetric::{Axis, NoCorrection, Point};
 /// Something whose uncertainty makes that of the deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Input {
-    /// Functions at their nodes, and squarenesses.
+    /// Functions at their nodes, squarenesses, and thermal coefficients that were found with them.
     Errors,
     /// What functions do between their nodes.
     Between,
@@ -23,9 +24,9 @@ enum Input {
     Roll(Axis),
     /// A thermometer, from 0.
     Temperature(usize),
-    /// By how much the scale of an axis expands.
+    /// By how much the scale of an axis expands, found otherwise.
     Expansion(Axis),
-    /// By how much the guide of an axis bends towards a direction.
+    /// By how much the guide of an axis bends towards a direction, found otherwise.
     Bend(Axis, Axis),
 }
 
@@ -40,7 +41,7 @@ struct Now<'a> {
 impl VolumetricModel {
     /// The standard uncertainty of the deviation at a command: of the functions, squarenesses,
     /// temperatures and thermal coefficients as far as they have one, with that of the detectors'
-    /// displacements and rolls. Functions and squarenesses have in common what
+    /// displacements and rolls. Functions, squarenesses and thermal coefficients have in common what
     /// [`Self::with_covariance`] says of them; all else is taken as independent.
     ///
     /// `u_temperatures`, in kelvin by channel, are what the temperatures are known to now; a channel
@@ -72,10 +73,43 @@ impl VolumetricModel {
         Ok(Point::of(squares.map(f64::sqrt)))
     }
 
-    /// What functions and squarenesses make of the deviation, where it is known what they have in common.
+    /// What functions, squarenesses and thermal coefficients make of the deviation, where it is known what they have in
+    /// common.
     fn variances_in_common(&self, command: Point, now: &Conditions) -> Option<V3> {
+        let known = self.covariance.as_ref()?;
         let tool = core::array::from_fn(|k| now.tool[k]);
-        Some(self.covariance.as_ref()?.variances(command, tool))
+        let found = known.coefficients();
+        let mut warm = [[0.0; 3]; COEFFICIENTS_MAX];
+        for (effect, it) in warm.iter_mut().zip(found) {
+            *effect = self.effect_of_coefficient(*it, command, now);
+        }
+        Some(known.variances(command, tool, &warm[..found.len()]))
+    }
+
+    /// What a coefficient moves the tool by when it is too large by its standard uncertainty.
+    fn effect_of_coefficient(&self, it: Coefficient, command: Point, now: &Conditions) -> V3 {
+        let thermal = &self.machine.thermal;
+        match it {
+            Coefficient::Expansion(axis) => {
+                let k = axis.index();
+                let way = (command - thermal.fixed).array()[k];
+                unit(axis).map(|it| it * way * now.u_expansion[k])
+            }
+            Coefficient::Bend(axis, towards) => {
+                let own = |it: &&ThermalBend| (it.axis, it.towards) == (axis, towards);
+                thermal.bends.iter().find(own).map_or([0.0; 3], |bend| {
+                    let gradient = now.gradients[axis.index()][towards.index()];
+                    let bows = gradient * bend.u.value();
+                    self.arc_effect(bend, command, now).map(|it| it * bows)
+                })
+            }
+        }
+    }
+
+    /// Whether it is known what a coefficient has in common with the errors.
+    fn is_in_common(&self, it: Coefficient) -> bool {
+        let known = self.covariance.as_ref();
+        known.is_some_and(|known| known.coefficients().contains(&it))
     }
 
     /// Tells `each` of every input that is independent of the others: what a unit of it moves the tool by, and its
@@ -138,11 +172,17 @@ impl VolumetricModel {
             each(Input::Temperature(at), effect, u_of_channel(at));
         }
         for axis in Axis::ALL {
+            if self.is_in_common(Coefficient::Expansion(axis)) {
+                continue;
+            }
             let k = axis.index();
             let grows = unit(axis).map(|it| it * way[k]);
-            each(Input::Expansion(axis), grows, now.u_expansion[k]);
+            each(Input::Expansion(axis), grows, now.u_expansion[k].abs());
         }
         for bend in &thermal.bends {
+            if self.is_in_common(Coefficient::Bend(bend.axis, bend.towards)) {
+                continue;
+            }
             let gradient = now.gradients[bend.axis.index()][bend.towards.index()];
             let effect = self.arc_effect(bend, command, now);
             let bows = effect.map(|it| it * gradient);
