@@ -11,7 +11,7 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::{Edit, Rig, VOLUMETRIC, random};
 
-use crate::programs::{Bench, Process, live_rigs, number};
+use crate::programs::{Bench, Process, check_error, live_rigs, number};
 use crate::serve::{ask, keep};
 use crate::volumetric_live::small;
 
@@ -293,8 +293,16 @@ fn three_axes_whose_service_is_killed_while_they_become_warm_become_warm_again_w
 
         let service = keep(&bench);
         // They followed set-points, and have a fault since none comes.
-        let (status, reset) = ask(bench.folder(), "POST /v1/reset", &json!({}));
-        assert_eq!(status, 200, "{reset}");
+        let refused = bench.run(&["zero", "machine.toml"]).with_code(4);
+        check_error(&refused, &["enabling failed", "truestage reset"]);
+        let reset = bench
+            .run(&["reset", "machine.toml", "--axis", "x"])
+            .with_code(0);
+        assert_eq!(
+            (&reset["axis"], &reset["after"]),
+            (&"x".into(), &"Disabled".into()),
+            "{reset}"
+        );
         let client = bench.start(&["calibrate", "machine.toml", "--resume"]);
         let ended = client.end_heard(|client, said| {
             if said.starts_with("> line ") {

@@ -7,6 +7,7 @@ mod calibrated;
 mod heard;
 mod jobs;
 mod motions;
+mod reset;
 
 use std::path::Path;
 use std::time::{Duration, Instant};

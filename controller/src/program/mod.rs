@@ -455,7 +455,9 @@ fn done(
         Command::New(args) => new::run(&args, output),
         Command::Doctor(args) => doctor::run(&args, output),
         Command::Scan(args) => scan::run(&args, output),
-        Command::Reset(args) => reset::run(&args, output),
+        Command::Reset(args) => kept::or_by_its_service(reset::run(&args, output), |service| {
+            service.reset(&args, output)
+        }),
         Command::Zero(args) => before::run(Intent::Zero(&args), output),
         Command::Calibrate(args) => before::run(Intent::Calibrate(&args), output),
         Command::Verify(args) => before::run(Intent::Verify(&args), output),

@@ -98,7 +98,7 @@ pub enum DeviceError {
         seen: Seen,
     },
     /// The drive refused or failed a command.
-    #[error("{node}: {step} failed, drive is in {state}")]
+    #[error("{node}: {step} failed, drive is in {state}{}", what_to_do(*state))]
     DriveRefused {
         node: NodeId,
         step: &'static str,
@@ -219,6 +219,16 @@ pub enum DeviceError {
         step: &'static str,
         seen: Seen,
     },
+}
+
+/// What helps against a state in which a drive does nothing that is asked of it.
+const fn what_to_do(state: PowerState) -> &'static str {
+    match state {
+        PowerState::Fault | PowerState::FaultReactionActive => {
+            ": remove the fault's cause, acknowledge it by `truestage reset`, and zero the axis again"
+        }
+        _ => "",
+    }
 }
 
 fn of_parameter(parameter: Option<Parameter>) -> String {

@@ -121,7 +121,11 @@ fn machines() -> Vec<Form> {
             "a fault that was acknowledged",
             [
                 ("axis", text()),
-                ("before", text().about("The drive's state.")),
+                (
+                    "before",
+                    text()
+                        .about("The drive's state; where a service keeps the machine, the axis's."),
+                ),
                 ("after", text()),
             ],
         )
