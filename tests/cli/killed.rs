@@ -37,9 +37,18 @@ impl Watcher {
 
     /// Where the stage truly is, in millimetres.
     fn true_mm(&self) -> f64 {
+        number(&self.truth()["position_mm"])
+    }
+
+    /// Where the tool of three axes truly is, in millimetres.
+    fn true_tool_mm(&self) -> [f64; 3] {
+        let truth = self.truth();
+        ["x_mm", "y_mm", "z_mm"].map(|key| number(&truth[key]))
+    }
+
+    fn truth(&self) -> Value {
         let truth = lend_hand(&self.clock, "truth").expect("the truth");
-        let truth: Value = serde_json::from_str(&truth).expect("an object");
-        number(&truth["position_mm"])
+        serde_json::from_str(&truth).expect("an object")
     }
 
     fn wait(&mut self, span: Duration) {
@@ -263,6 +272,24 @@ fn goes_on_to_its_end(bench: &Bench, left: &Value) {
     assert_eq!(ended["result"]["journal"], left["journal"], "{ended}");
 }
 
+/// Somebody who came when the tool of three axes moved: while he is there and does not wait, no time passes.
+fn watcher_in_motion(bench: &Bench) -> Watcher {
+    let mut watcher = Watcher::of(bench);
+    let mut before = watcher.true_tool_mm();
+    let is_moving = |_: u32| {
+        watcher.wait(Duration::from_millis(10));
+        let now = watcher.true_tool_mm();
+        let moves = now
+            .iter()
+            .zip(&before)
+            .any(|(now, before)| (now - before).abs() > IN_MOTION_MM);
+        before = now;
+        moves
+    };
+    assert!((0..1000).any(is_moving), "it does not move");
+    watcher
+}
+
 /// Which lines somebody was asked to set up.
 fn asked(said: &str) -> Vec<u32> {
     let lines = said.lines().filter_map(|it| it.strip_prefix("> line "));
@@ -280,8 +307,9 @@ fn three_axes_whose_service_is_killed_while_they_become_warm_become_warm_again_w
         let service = keep(&bench);
         let client = bench.start(&["calibrate", "machine.toml", "--warm-up-min", "0.5"]);
         let ended = client.end_heard(|_, said| {
-            // The lines that are read cold are read: the axes go to and fro.
+            // The lines that are read cold are read: the axes go to and fro. At rest no drive would miss anything.
             if said.contains("may be packed up") {
+                let _watcher = watcher_in_motion(&bench);
                 service.signal(Signal::SIGKILL);
             }
         });
