@@ -48,7 +48,8 @@ fn calibrate(volume: &mut Volume) -> (String, String) {
     (made.id, made.journal.display().to_string())
 }
 
-fn calibrated() -> Calibrated {
+/// It can go on with its work.
+fn at_work() -> Calibrated {
     let mut volume = Volume::zeroed(1, quick, |text| text);
     let (id, journal) = calibrate(&mut volume);
     let folder = volume.bench.folder.path();
@@ -62,8 +63,16 @@ fn calibrated() -> Calibrated {
     }
 }
 
+/// It was shut down.
+fn calibrated() -> Calibrated {
+    let mut calibrated = at_work();
+    good(calibrated.volume.bench.machine.shut_down());
+    calibrated
+}
+
+/// Likewise.
 fn verified() -> Verified {
-    let mut calibrated = calibrated();
+    let mut calibrated = at_work();
     let volume = &mut calibrated.volume;
     let again = calibrate(volume);
     let (mut hand, store) = (volume.bench.emulated.clone(), volume.bench.store.clone());

@@ -206,8 +206,9 @@ const DATUM_IS_SET_MS: u64 = 1500;
 
 #[test]
 fn a_fringe_count_that_slips_is_recognised_whenever_it_does() {
-    // With the whole of it each moment between two readings comes once: the shortest way between two takes 70 ms. A stage whose scatter
-    // hides one has other errors: of so many the comparison may miss one by chance, and then not at other stages.
+    // In the whole of it each moment between two readings comes once: the shortest way between two takes 70 ms. A stage
+    // whose scatter hides one has other errors: of so many the comparison may miss one by chance, and then not at other
+    // stages.
     let missed = |after_ms: u64, seed: u64| {
         println!("after {after_ms} ms, seed {seed}");
         catch_unwind(|| check_jump(-1, after_ms, seed)).is_err()

@@ -123,8 +123,7 @@ mod tests {
         told
     }
 
-    /// Stated: 5e-5 a run. Of 10 000 of a kind at most four, which a right rate exceeds once in 6000 times.
-    /// Of `count` runs of each sort no more than `most` are blamed: the stated rate is one of 10 000.
+    /// Of `count` runs of each sort no more than `most` are blamed: stated are 5e-5 a run.
     fn judge_sound(seed: u64, count: u32, most: u32) {
         let mut noise = Noise(seed);
         for repeatability_nm in [5.0, 30.0, 100.0, 300.0, 1000.0] {
@@ -142,13 +141,14 @@ mod tests {
 
     #[test]
     fn no_drift_and_no_scatter_is_taken_for_a_slip() {
+        // A right rate exceeds two of 3000 once in 2000 times.
         judge_sound(31, 3000, 2);
     }
 
     #[test]
     #[ignore = "a count of a minute"]
     fn slips_of_sound_stages_counted_over_many() {
-        // Twenty sorts, each with ten alarms to be expected at most: more than 24 of these come once in 20 000 times.
+        // Five are to be expected; twice the rate exceeds 24 once in 20 000 times.
         judge_sound(3_031, 100_000, 24);
     }
 

@@ -80,8 +80,7 @@ fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
             "journal": zeroed.journal,
         }),
         told: words.map(|it| (it.zeroed)(axis, &zeroed)),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -100,7 +99,7 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
         }),
         told: words.map(|it| (it.calibrated)(&made)),
         stored: vec![(axis.to_owned(), made.id.clone())],
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -126,8 +125,8 @@ fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
             "journal": verified.journal,
         }),
         told: words.map(|it| (it.verified)(axis, &verified, compensated)),
-        stored: Vec::new(),
         bad: verified.out_of_tolerance(axis).filter(|_| compensated),
+        ..Found::default()
     })
 }
 
@@ -166,8 +165,7 @@ fn do_job(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
             "journal": done.journal,
         }),
         told: words.map(|it| (it.job_done)(job, &done)),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 

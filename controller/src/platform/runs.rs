@@ -103,8 +103,7 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
             "journal": zeroed.journal,
         }),
         told: words.map(|it| (it.zeroed)(&zeroed)),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -123,7 +122,7 @@ fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
         }),
         told: words.map(|it| (it.calibrated)(&made)),
         stored: made.stored(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -144,8 +143,8 @@ fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "journal": verified.journal,
         }),
         told: words.map(|it| (it.verified)(&verified, compensated)),
-        stored: Vec::new(),
         bad: verified.out_of_tolerance().filter(|_| compensated),
+        ..Found::default()
     })
 }
 

@@ -152,8 +152,7 @@ fn zero(work: Work<'_>, axis: &str) -> Result<Found, Failure> {
     Ok(Found {
         figures: json!({}),
         told: words.map(|it| (it.zeroed)(axis)),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -176,7 +175,7 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
         }),
         told: words.map(|it| (it.calibrated)(axis, &made)),
         stored: vec![(axis.to_owned(), made.id.clone())],
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -205,8 +204,8 @@ fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
             "journal": verified.journal,
         }),
         told: words.map(|it| (it.verified)(axis, &verified)),
-        stored: Vec::new(),
         bad: verified.out_of_tolerance(axis),
+        ..Found::default()
     })
 }
 

@@ -184,8 +184,7 @@ fn follow(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "memory": kept.as_ref().map(|it| &it.id),
         }),
         told: words.map(|it| (it.followed)(&followed, &judged.path, kept.as_ref())),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -195,8 +194,7 @@ fn zero(work: Work<'_>) -> Result<Found, Failure> {
     Ok(Found {
         figures: json!({}),
         told: words.map(|it| (it.zeroed)()),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -216,7 +214,7 @@ fn calibrate(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
         }),
         told: words.map(|it| (it.calibrated)(&made)),
         stored: made.stored(),
-        bad: None,
+        ..Found::default()
     })
 }
 
@@ -237,8 +235,8 @@ fn verify(work: Work<'_>, task: &Task) -> Result<Found, Failure> {
             "journal": verified.journal,
         }),
         told: words.map(|it| (it.verified)(&verified)),
-        stored: Vec::new(),
         bad: verified.out_of_tolerance().filter(|_| !task.uncompensated),
+        ..Found::default()
     })
 }
 
@@ -248,7 +246,6 @@ fn reference(work: Work<'_>) -> Result<Found, Failure> {
     Ok(Found {
         figures: json!({"references": taken.id, "geometry": taken.references.content.geometry}),
         told: words.map(|it| (it.referenced)(&taken)),
-        stored: Vec::new(),
-        bad: None,
+        ..Found::default()
     })
 }

@@ -587,17 +587,14 @@ fn tell_parts(volume: &Volume, made: &VolumetricCalibrated) {
     let Some(budget) = &made.budget else {
         return;
     };
+    let places = budget.places.len() as f64;
     for (at, it) in budget.contributions.iter().enumerate() {
-        let shares = budget
-            .places
-            .iter()
-            .map(|place| (it.value * place.sensitivities[at] / place.u_si).powi(2));
-        let share = shares.sum::<f64>() / budget.places.len() as f64;
-        let all = budget
-            .places
-            .iter()
-            .map(|place| (it.value * place.sensitivities[at]).powi(2));
-        let variance = 1e12 * all.sum::<f64>() / (3.0 * budget.places.len() as f64);
+        let (mut share, mut variance) = (0.0, 0.0);
+        for place in &budget.places {
+            let own = it.value * place.sensitivities[at];
+            share += (own / place.u_si).powi(2) / places;
+            variance += 1e12 * own.powi(2) / (3.0 * places);
+        }
         eprintln!(
             "  calibration: {:5.1} % {variance:.5} um2 {}",
             100.0 * share,

@@ -14,25 +14,22 @@ impl Service {
     pub(crate) fn reset(&self, args: &AxisArgs, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
         let axes = ask_on(&self.at, "GET", "/v1/axes", "")?;
-        let names = axes.as_array().into_iter().flatten();
-        let names = names.map(|it| plain(it["name"].as_str().unwrap_or_default()));
-        let axis = choose_axis(names.collect(), args)?;
-        let state = || -> Result<String, crate::Failure> {
-            let seen = ask_on(&self.at, "GET", &format!("/v1/axes/{axis}"), "")?;
-            Ok(word(&seen["state"]))
-        };
-        let before = state()?;
+        let all = || axes.as_array().into_iter().flatten();
+        let axis = choose_axis(all().map(|it| text(&it["name"])).collect(), args)?;
+        let seen = all().find(|it| text(&it["name"]) == axis);
+        let before = seen.map_or_else(String::new, |it| text(&it["state"]));
         ask_on(&self.at, "POST", "/v1/reset", "{}")?;
-        let after = state()?;
-        let text = format!(
+        let seen = ask_on(&self.at, "GET", &format!("/v1/axes/{axis}"), "")?;
+        let after = text(&seen["state"]);
+        let told = format!(
             "axis {axis}: was in {before}, is now in {after}; the service has acknowledged every drive's fault: zero each axis \
              before it moves"
         );
         let value = json!({"axis": axis, "before": before, "after": after});
-        output.result(&text, &value)
+        output.result(&told, &value)
     }
 }
 
-fn word(state: &Value) -> String {
-    plain(state.as_str().unwrap_or("unknown")).replace('_', " ")
+fn text(value: &Value) -> String {
+    plain(value.as_str().unwrap_or_default())
 }
