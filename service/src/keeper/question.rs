@@ -106,7 +106,7 @@ impl Keeper {
         let Some(question) = self.talk.borrow_mut().asked.take() else {
             return;
         };
-        let Some(run) = self.runs.running() else {
+        let Some(run) = self.runs.running_mut() else {
             return;
         };
         run.asked += 1;
@@ -143,7 +143,7 @@ impl Keeper {
     }
 
     /// Refuses what moves an axis, or switches one on, while a run has asked for something that is done by hand.
-    pub(super) fn require_no_hands(&mut self) -> Result<(), Problem> {
+    pub(super) fn require_no_hands(&self) -> Result<(), Problem> {
         let talk = self.talk.borrow();
         let is_next = talk.asked.as_ref().is_some_and(|it| !it.takes_text);
         drop(talk);

@@ -1,6 +1,8 @@
 //! Runs: planned, started, stopped; what they do is sequential code on the machine's thread.
 
 mod paused;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -71,6 +73,8 @@ pub(super) struct Run {
     pub(super) task: Task,
     axes: Vec<usize>,
     pub(super) view: RunView,
+    /// Its view as it was published last; `None` since it may have changed.
+    published: Option<Arc<RunView>>,
     /// So many questions were asked.
     pub(super) asked: u32,
     /// The last that was answered, and how.
@@ -89,12 +93,26 @@ impl Run {
             task,
             axes,
             view,
+            published: None,
             asked: 0,
             answered: None,
             stopped: None,
             is_pausing: false,
             is_over: false,
         }
+    }
+
+    /// Its view for a snapshot, the same one until it changes: what it found is large.
+    fn publish(&mut self) -> Arc<RunView> {
+        let view = &self.view;
+        let shown = self.published.get_or_insert_with(|| Arc::new(view.clone()));
+        Arc::clone(shown)
+    }
+
+    /// For whoever changes it.
+    fn changing(&mut self) -> &mut Self {
+        self.published = None;
+        self
     }
 
     /// Whether its procedure is to end before it is complete.
@@ -133,11 +151,10 @@ pub(super) struct Runs {
 impl Runs {
     /// The list for a snapshot, the same one until something changes.
     pub(super) fn list(&mut self) -> Arc<Vec<Arc<RunView>>> {
-        let kept = &self.kept;
-        let list = self.published.get_or_insert_with(|| {
-            let views = kept.iter().map(|it| Arc::new(it.view.clone()));
-            Arc::new(views.collect())
-        });
+        let kept = &mut self.kept;
+        let list = self
+            .published
+            .get_or_insert_with(|| Arc::new(kept.iter_mut().map(Run::publish).collect()));
         Arc::clone(list)
     }
 
@@ -170,19 +187,31 @@ impl Runs {
     pub(super) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
         self.published = None;
         let found = self.kept.iter_mut().find(|it| *it.task.id == *id);
-        found.ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
+        found
+            .map(Run::changing)
+            .ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
     }
 
-    /// The one that goes on, and is not to end.
-    pub(super) fn running(&mut self) -> Option<&mut Run> {
+    /// The one that goes on, and is not to end, to look at.
+    pub(super) fn running(&self) -> Option<&Run> {
+        self.kept
+            .iter()
+            .find(|it| it.view.state == RunState::Running)
+    }
+
+    /// The same, to change it.
+    pub(super) fn running_mut(&mut self) -> Option<&mut Run> {
         let run = self.under_way();
         run.filter(|it| it.view.state == RunState::Running)
     }
 
+    /// The one that goes on or is to end, to change it.
     pub(super) fn under_way(&mut self) -> Option<&mut Run> {
-        self.published = None;
         let mut kept = self.kept.iter_mut();
-        kept.find(|it| matches!(it.view.state, RunState::Running | RunState::Stopping))
+        let run =
+            kept.find(|it| matches!(it.view.state, RunState::Running | RunState::Stopping))?;
+        self.published = None;
+        Some(run.changing())
     }
 }
 
