@@ -1,51 +1,11 @@
 //! `truestage jog`: an axis that runs as long as somebody says so.
 
-use core::time::Duration;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::{self, JoinHandle};
-
-use drivers::transport::Transport;
-use drivers::transport::live::Live;
 use nix::sys::signal::Signal;
 use serde_json::json;
 
+use crate::held::Brake;
 use crate::programs::{Bench, live_rigs, number};
 use crate::serve::{ask, keep};
-
-/// Holds the machine's time back to a tenth of the wall's: who renews a dead-man of 200 ms has two seconds for it, on
-/// however busy a computer.
-struct Brake {
-    release: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Brake {
-    fn on(bench: &Bench) -> Self {
-        const STEP: Duration = Duration::from_millis(5);
-        const TIMES_SLOWER: u32 = 10;
-        let clock = bench.clock("a brake");
-        let (release, released) = channel();
-        let thread = thread::spawn(move || {
-            let time = Live::builder(clock).build();
-            let mut time = time.expect("it has no port to open");
-            while released.recv_timeout(STEP * TIMES_SLOWER) == Err(RecvTimeoutError::Timeout) {
-                time.sleep_until(time.now() + STEP);
-            }
-        });
-        Self {
-            release: Some(release),
-            thread: Some(thread),
-        }
-    }
-}
-
-impl Drop for Brake {
-    fn drop(&mut self) {
-        self.release.take();
-        let ended = self.thread.take().map(JoinHandle::join);
-        assert!(thread::panicking() || matches!(ended, Some(Ok(()))));
-    }
-}
 
 #[test]
 fn an_axis_is_jogged_for_a_time_and_to_its_soft_limit() {

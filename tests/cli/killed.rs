@@ -4,13 +4,12 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use drivers::transport::Transport;
-use drivers::transport::live::Live;
 use drivers::transport::lockstep::lend_hand;
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::{Edit, Rig, VOLUMETRIC, random};
 
+use crate::held::Steps;
 use crate::programs::{Bench, Process, check_error, live_rigs, number};
 use crate::serve::{ask, keep};
 use crate::volumetric_live::small;
@@ -23,15 +22,14 @@ const STANDS_MM: f64 = 1e-3;
 /// Somebody who only looks: time passes while it waits.
 struct Watcher {
     clock: PathBuf,
-    time: Live,
+    time: Steps,
 }
 
 impl Watcher {
     fn of(bench: &Bench) -> Self {
-        let time = Live::builder(bench.clock("a watcher")).build();
         Self {
             clock: bench.folder().join("clock"),
-            time: time.expect("it has no port to open"),
+            time: Steps::of(bench),
         }
     }
 
@@ -52,7 +50,7 @@ impl Watcher {
     }
 
     fn wait(&mut self, span: Duration) {
-        self.time.sleep_until(self.time.now() + span);
+        self.time.pass(span);
     }
 }
 

@@ -9,6 +9,7 @@ mod demo;
 mod example;
 mod examples;
 mod gantry;
+mod held;
 mod intended;
 mod interrupted;
 mod job;

@@ -80,13 +80,19 @@ impl Process {
     pub(crate) fn wait_until(&mut self, reached: impl Fn() -> bool) {
         const LOOK_EVERY_MS: u16 = 5;
         while !reached() {
-            let ended = self.0.try_wait().expect("a child can be asked");
-            assert!(ended.is_none(), "it ended before: {:?}", self.collect());
+            self.goes_on();
             let output = self.0.stdout.as_ref().expect("it is piped").as_fd();
             let mut fds = [PollFd::new(output, PollFlags::POLLIN)];
             // A signal only makes the next look come sooner.
             let _ = poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS));
         }
+    }
+
+    /// # Panics
+    /// When it has ended.
+    pub(crate) fn goes_on(&mut self) {
+        let ended = self.0.try_wait().expect("a child can be asked");
+        assert!(ended.is_none(), "it ended before: {:?}", self.collect());
     }
 
     /// Waits for its end.

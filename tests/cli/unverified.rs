@@ -8,6 +8,7 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::{Edit, LINEAR, Shipped, UVW};
 
+use crate::held::Steps;
 use crate::programs::{Bench, live_rigs, text};
 use crate::serve::keep;
 
@@ -29,9 +30,13 @@ fn entries(bench: &Bench, verb: &str, entry: &str) -> usize {
 /// What a calibration tells whose verification is stopped when it has written two of `entry`.
 fn stopped(bench: &Bench, entry: &str) -> Value {
     let mut process = bench.start(&["calibrate", "machine.toml", "--verify"]);
-    process.wait_until(|| entries(bench, "verify", entry) >= 2);
+    let mut time = Steps::of(bench);
+    time.until(&mut process, || entries(bench, "verify", entry) >= 2);
     process.signal(Signal::SIGINT);
+    // Whoever is stopped has the time to say so.
+    let brake = time.slowly();
     let ended = process.end();
+    drop(brake);
     assert!(ended.said.contains("stopped on request"), "{ended:?}");
     assert!(
         !ended.said.contains("the same command with --resume"),
@@ -106,9 +111,11 @@ fn a_kept_calibration_whose_verification_is_stopped_is_told_and_verified_later()
 /// What a calibration tells whose verification has lost the beam when two of its points were written.
 fn beam_lost(bench: &Bench) -> Value {
     let mut process = bench.start(&["calibrate", "machine.toml", "--verify"]);
-    process.wait_until(|| entries(bench, "verify", "point") >= 2);
+    let mut time = Steps::of(bench);
+    time.until(&mut process, || entries(bench, "verify", "point") >= 2);
     let blocked = "fault fault = { kind = \"beam_blocked\" }";
     lend_hand(&bench.folder().join("clock"), blocked).expect("the machine has a beam");
+    drop(time);
     process.end().with_code(4)
 }
 

@@ -437,6 +437,31 @@ fn code_has_no_loose_ends() {
     }
 }
 
+/// `tests/run` checks these for two systems, which stand for all others as long as this holds; what needs Linux is a
+/// feature.
+#[test]
+fn what_is_for_every_system_does_not_ask_which_one_it_is() {
+    const ASKS: &[&str] = &[
+        "unix",
+        "windows",
+        "target_arch",
+        "target_endian",
+        "target_family",
+        "target_os",
+        "target_pointer_width",
+    ];
+    for folder in ["units", "wire", "drivers", "compensator", "mock-bus"] {
+        for (name, text) in sources(folder) {
+            for (line, code) in code_lines(&text).filter(|it| it.1.contains("cfg")) {
+                let asked = ASKS.iter().find(|asked| code.contains(**asked));
+                assert_eq!(asked, None, "{name}:{line}");
+            }
+        }
+        let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
+        assert!(!manifest.contains("[target."), "{folder}");
+    }
+}
+
 #[test]
 fn every_package_is_in_the_workspace() {
     let text = fs::read_to_string(root().join("Cargo.toml")).unwrap();

@@ -1,17 +1,16 @@
 //! Runs: planned, started, stopped; what they do is sequential code on the machine's thread.
 
+mod kept;
 mod paused;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use machine::{Machine, Stage};
 use serde_json::json;
 use truestage::Failure;
-use truestage::runs::{self, Found, Group};
+use truestage::runs::Found;
 
 use super::mechanics::Mechanics;
 use super::seat::Task as SeatTask;
@@ -23,103 +22,9 @@ use crate::problem::{Code, Problem};
 use crate::request::{RunKind, RunRequest};
 use crate::snapshot::CalibrationInUse;
 use crate::view::{Cause, RunPlanView, RunState, RunView, Stopped, StoredView, ToldView};
-
-/// So many runs are kept in the snapshot.
-const KEPT: usize = 64;
-/// So many paths and jobs may wait.
-const PATHS: usize = 4;
-
-/// What the machine's thread is to do for a run.
-#[derive(Clone, Debug)]
-pub(crate) struct Task {
-    pub(crate) id: Arc<str>,
-    pub(crate) request: RunRequest,
-    /// What it is for.
-    pub(crate) group: Arc<Group>,
-    /// Whether it goes on where it was left.
-    pub(crate) is_resumed: bool,
-    /// The journal that it goes on with.
-    pub(crate) resume: Option<PathBuf>,
-    /// The path that it follows, or the job that it does.
-    judged: Option<Judged>,
-}
-
-impl Task {
-    /// What its procedure is to do.
-    pub(crate) fn of_procedure(&self) -> runs::Task {
-        runs::Task {
-            stage: self.request.kind.stage(),
-            resume: self.resume.clone(),
-            accept_drift: self.request.accept_drift,
-            aside: self.request.aside,
-            verify: self.request.verify,
-            uncompensated: self.request.uncompensated,
-            warm_up_min: self.request.warm_up_min,
-            first_part: self.request.kind == RunKind::FirstPart,
-            path: match &self.judged {
-                Some(Judged::Path { path, .. }) => Some(path.clone()),
-                Some(Judged::Job { .. }) | None => None,
-            },
-            job: match &self.judged {
-                Some(Judged::Job { job, .. }) => Some(job.clone()),
-                Some(Judged::Path { .. }) | None => None,
-            },
-        }
-    }
-}
-
-#[derive(Clone, Debug)]
-pub(super) struct Run {
-    pub(super) task: Task,
-    axes: Vec<usize>,
-    pub(super) view: RunView,
-    /// Its view as it was published last; `None` since it may have changed.
-    published: Option<Arc<RunView>>,
-    /// So many questions were asked.
-    pub(super) asked: u32,
-    /// The last that was answered, and how.
-    pub(super) answered: Option<(u32, String)>,
-    /// Somebody stopped it; it ends so when its procedure has ended and its axes stand.
-    stopped: Option<Stopped>,
-    /// Somebody pauses it, likewise; a stop counts for more.
-    is_pausing: bool,
-    /// Its procedure has ended.
-    is_over: bool,
-}
-
-impl Run {
-    const fn new(task: Task, axes: Vec<usize>, view: RunView) -> Self {
-        Self {
-            task,
-            axes,
-            view,
-            published: None,
-            asked: 0,
-            answered: None,
-            stopped: None,
-            is_pausing: false,
-            is_over: false,
-        }
-    }
-
-    /// Its view for a snapshot, the same one until it changes: what it found is large.
-    fn publish(&mut self) -> Arc<RunView> {
-        let view = &self.view;
-        let shown = self.published.get_or_insert_with(|| Arc::new(view.clone()));
-        Arc::clone(shown)
-    }
-
-    /// For whoever changes it.
-    fn changing(&mut self) -> &mut Self {
-        self.published = None;
-        self
-    }
-
-    /// Whether its procedure is to end before it is complete.
-    const fn is_to_end(&self) -> bool {
-        self.stopped.is_some() || self.is_pausing
-    }
-}
+use kept::Run;
+pub(super) use kept::Runs;
+pub(crate) use kept::Task;
 
 /// What it gave.
 fn show_found(view: &mut RunView, found: Found) {
@@ -138,80 +43,6 @@ fn plan_along(judged: &Judged) -> RunPlanView {
     match judged {
         Judged::Path { path, .. } => RunPlanView::of_path(path),
         Judged::Job { job, .. } => shown(job.planned.clone()),
-    }
-}
-
-/// All runs.
-#[derive(Debug, Default)]
-pub(super) struct Runs {
-    kept: VecDeque<Run>,
-    published: Option<Arc<Vec<Arc<RunView>>>>,
-}
-
-impl Runs {
-    /// The list for a snapshot, the same one until something changes.
-    pub(super) fn list(&mut self) -> Arc<Vec<Arc<RunView>>> {
-        let kept = &mut self.kept;
-        let list = self
-            .published
-            .get_or_insert_with(|| Arc::new(kept.iter_mut().map(Run::publish).collect()));
-        Arc::clone(list)
-    }
-
-    /// Whether the procedure that runs has to end.
-    pub(super) fn is_to_end(&self) -> bool {
-        self.kept.iter().any(|it| it.is_to_end() && !it.is_over)
-    }
-
-    /// One more; the oldest that is over or was never begun makes room.
-    fn keep(&mut self, run: Run) {
-        self.kept.push_back(run);
-        if self.kept.len() > KEPT {
-            let is_old = |it: &Run| it.view.state.is_end() || it.view.state == RunState::Planned;
-            let old = self.kept.iter().position(is_old);
-            old.map(|at| self.kept.remove(at));
-        }
-        self.published = None;
-    }
-
-    /// Paths are long, and wait in memory until they are followed; so do jobs.
-    fn require_room_for(&self, judged: Option<&Judged>) -> Result<(), Problem> {
-        let waiting = self.kept.iter().filter(|it| it.task.judged.is_some());
-        if judged.is_none() || waiting.count() < PATHS {
-            return Ok(());
-        }
-        let what = format!("{PATHS} paths and jobs are planned or under way");
-        Err(Problem::new(Code::Busy, what, "start them, or abort one"))
-    }
-
-    pub(super) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
-        self.published = None;
-        let found = self.kept.iter_mut().find(|it| *it.task.id == *id);
-        found
-            .map(Run::changing)
-            .ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
-    }
-
-    /// The one that goes on, and is not to end, to look at.
-    pub(super) fn running(&self) -> Option<&Run> {
-        self.kept
-            .iter()
-            .find(|it| it.view.state == RunState::Running)
-    }
-
-    /// The same, to change it.
-    pub(super) fn running_mut(&mut self) -> Option<&mut Run> {
-        let run = self.under_way();
-        run.filter(|it| it.view.state == RunState::Running)
-    }
-
-    /// The one that goes on or is to end, to change it.
-    pub(super) fn under_way(&mut self) -> Option<&mut Run> {
-        let mut kept = self.kept.iter_mut();
-        let run =
-            kept.find(|it| matches!(it.view.state, RunState::Running | RunState::Stopping))?;
-        self.published = None;
-        Some(run.changing())
     }
 }
 
