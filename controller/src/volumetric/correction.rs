@@ -34,7 +34,7 @@ use units::{Celsius, Metres, Quantity, Radians};
 use crate::config::MachineConfig;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::inputs::{
-    DetectorPlace, RollReader, confirmed_by_samples, feed_of, slide_of,
+    DetectorPlace, RollReader, repeats_of, repeats_of_module, slide_of,
 };
 use crate::volumetric::limits;
 use crate::volumetric::settings::{
@@ -106,9 +106,9 @@ pub struct VolumetricCorrection {
     trail: Trail,
     /// When what is seen is nothing the model was proven for.
     reaction: Option<ReactionName>,
-    /// Of a displacement by detectors that are believed.
-    u_displacement: Metres,
-    u_roll: Radians,
+    /// Of displacements of x, y and z by detectors that are believed.
+    u_displacement: [Metres; 3],
+    u_roll: [Radians; 3],
     /// For which command it gave a correction last, and as what the machine was then.
     given: Option<(Point, Conditions)>,
 }
@@ -325,23 +325,27 @@ fn per_axis(point: Point) -> PerAxis<Metres> {
     values
 }
 
-/// Of a displacement by the worst of the beams.
-fn u_displacement(config: &VolumetricConfig) -> Metres {
-    let beams = config.beam.each().into_iter().flatten();
-    let each = beams.map(|it| {
+/// Of each slide's displacement by its own beam; of one without a beam by the worst of the others.
+fn u_displacement(config: &VolumetricConfig) -> [Metres; 3] {
+    let of = |it: &BeamConfig| {
         let noise_um = it.on_the_slide().map_or(0.0, |it| it.noise_max_um());
         Metres::from_um(it.standard_uncertainty_um.unwrap_or(noise_um / NOISE_RANGE))
-    });
-    each.fold(Metres::ZERO, Quantity::max)
+    };
+    each_or_worst(config.beam.each().map(|it| it.map(of)))
 }
 
-/// Likewise of a roll.
-fn u_roll(config: &VolumetricConfig) -> Radians {
-    let each = config.roll.each().iter().map(|it| {
+/// Likewise of its roll.
+fn u_roll(config: &VolumetricConfig) -> [Radians; 3] {
+    let of = |it: &RollConfig| {
         let noise_arcsec = it.noise_max_arcsec / NOISE_RANGE;
         Radians::from_arcsec(it.standard_uncertainty_arcsec.unwrap_or(noise_arcsec))
-    });
-    each.fold(Radians::ZERO, Quantity::max)
+    };
+    each_or_worst(config.rolls().map(|it| it.map(of)))
+}
+
+fn each_or_worst<Q: Quantity>(each: [Option<Q>; 3]) -> [Q; 3] {
+    let worst = each.iter().flatten().copied().fold(Q::ZERO, Quantity::max);
+    each.map(|it| it.unwrap_or(worst))
 }
 
 fn feed(config: &VolumetricConfig) -> Result<&FeedConfig, VolumetricFailure> {
@@ -407,7 +411,7 @@ fn watched_beam(
     let axis = lever.axis();
     let common = feed(volumetric)?;
     let detector = |it| eye(it).map_err(|source| VolumetricFailure::Detector { axis, source });
-    let feed = |it| Feed::new(feed_settings(&feed_of(config, common, it)));
+    let feed = |it| Feed::new(feed_settings(common, repeats_of(config, it)));
     let end = match beam.at_the_end() {
         Some(it) => Some(EndOfTravel {
             detector: detector(it)?,
@@ -431,9 +435,10 @@ fn watched_roll(
     roll: &RollConfig,
     reference: Option<Function<Radians>>,
 ) -> Result<WatchedRoll, VolumetricFailure> {
-    let settings = confirmed_by_samples(config, feed(volumetric)?, &roll.analog);
+    let repeats = repeats_of_module(config, &roll.analog);
+    let settings = feed_settings(feed(volumetric)?, repeats);
     let reference = reference.ok_or(VolumetricFailure::NoRollReference)?;
-    let (axis, feed) = (volume_axis(roll.axis), Feed::new(feed_settings(&settings)));
+    let (axis, feed) = (volume_axis(roll.axis), Feed::new(settings));
     Ok(WatchedRoll {
         axis,
         reader: RollReader::new(config, roll)?,

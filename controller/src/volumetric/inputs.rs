@@ -7,7 +7,7 @@ use units::{Metres, Quantity, Radians, Time, Volts};
 
 use crate::config::{AnalogConfig, MachineConfig};
 use crate::volumetric::settings::roll_optics;
-use crate::volumetric::{BeamConfig, DetectorConfig, FeedConfig, RollConfig};
+use crate::volumetric::{BeamConfig, DetectorConfig, RollConfig};
 use machine::engine::{Channel, Observed};
 
 use crate::volumetric::VolumetricFailure;
@@ -94,29 +94,18 @@ fn sample(channels: &[Option<Channel>], places: &[usize; 4]) -> Option<Sample> {
     Some(sample)
 }
 
-/// A feed of `detector`: that of a camera is given each picture once.
-pub(super) fn feed_of(
-    config: &MachineConfig,
-    feed: &FeedConfig,
-    detector: DetectorConfig<'_>,
-) -> FeedConfig {
+/// How often a feed of `detector` is given the same: that of a camera is given each picture once.
+pub(super) fn repeats_of(config: &MachineConfig, detector: DetectorConfig<'_>) -> u32 {
     match detector {
-        DetectorConfig::Channels(own) => confirmed_by_samples(config, feed, &own.analog),
-        DetectorConfig::Camera(_) => feed.clone(),
+        DetectorConfig::Channels(own) => repeats_of_module(config, &own.analog),
+        DetectorConfig::Camera(_) => 1,
     }
 }
 
-/// A feed counts what it is given: a module that samples every n SYNCs gives the same n times.
-pub(super) fn confirmed_by_samples(
-    config: &MachineConfig,
-    feed: &FeedConfig,
-    module: &str,
-) -> FeedConfig {
+/// Likewise of a module's channels: one that samples every n SYNCs gives the same n times.
+pub(super) fn repeats_of_module(config: &MachineConfig, module: &str) -> u32 {
     let every = config.analog.get(module).and_then(|it| it.every_syncs());
-    FeedConfig {
-        confirm: feed.confirm.saturating_mul(every.unwrap_or(1).into()),
-        ..feed.clone()
-    }
+    every.unwrap_or(1).into()
 }
 
 /// Two voltages that tell the roll of a slide.

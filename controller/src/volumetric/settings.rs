@@ -285,8 +285,8 @@ pub(crate) fn influences(config: &[InfluenceConfig]) -> Result<Influences, Funct
     Ok(influences)
 }
 
-/// How values of detectors come and go.
-pub(crate) fn feed_settings(config: &FeedConfig) -> FeedSettings {
+/// How values of detectors come and go that are given `repeats` times each: so often a feed counts what it is given.
+pub(crate) fn feed_settings(config: &FeedConfig, repeats: u32) -> FeedSettings {
     FeedSettings {
         patience: millis(config.patience_ms),
         reaction: match config.reaction {
@@ -295,8 +295,9 @@ pub(crate) fn feed_settings(config: &FeedConfig) -> FeedSettings {
             ReactionName::Stop => Reaction::Stop,
         },
         blend: seconds(config.blend_s),
-        confirm: config.confirm,
+        confirm: config.confirm.saturating_mul(repeats),
         smoothing: seconds(config.smoothing_s),
+        repeats,
     }
 }
 

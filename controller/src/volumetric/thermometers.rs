@@ -12,7 +12,7 @@ use units::{Celsius, Time};
 use crate::certificate::Certified;
 use crate::config::MachineConfig;
 use crate::volumetric::VolumetricFailure;
-use crate::volumetric::inputs::{confirmed_by_samples, place_of_temperature};
+use crate::volumetric::inputs::{place_of_temperature, repeats_of_module};
 use crate::volumetric::settings::{feed_settings, temperature_settings};
 use crate::volumetric::{FeedConfig, TemperatureConfig};
 use machine::engine::{Observed, ThermometerSample};
@@ -88,9 +88,8 @@ impl Thermometers {
         // The slowest of a group to be believed tells when all of it are.
         let settings = |group: usize| {
             let members = own.iter().zip(&groups).filter(|(_, it)| **it == group);
-            let feeds = members.map(|(it, _)| confirmed_by_samples(config, feed, &it.analog));
-            let slowest = feeds.max_by_key(|it| it.confirm);
-            feed_settings(&slowest.unwrap_or_else(|| feed.clone()))
+            let each = members.map(|(it, _)| repeats_of_module(config, &it.analog));
+            feed_settings(feed, each.max().unwrap_or(1))
         };
         let each = own.iter().zip(&groups).map(|(it, group)| Thermometer {
             reader: Reader::new(config, it),

@@ -5,8 +5,8 @@ use compensator::budget::COVERAGE_FACTOR;
 use compensator::error_table::Limits;
 use compensator::volumetric::function::{Function, Shape};
 use compensator::volumetric::model::{
-    Coefficient, CoefficientCovariance, Conditions, ErrorCovariance, Machine, Squareness, Thermal,
-    ThermalBend, ThermalChannel, VolumetricModel,
+    Coefficient, CoefficientCovariance, Conditions, ErrorCovariance, Machine, Seen, Squareness,
+    Thermal, ThermalBend, ThermalChannel, VolumetricModel,
 };
 use compensator::volumetric::online::MovingState;
 use compensator::volumetric::{Axis, Point, Volume};
@@ -177,9 +177,14 @@ fn gtc_comes_to_the_budget_of_three_axes_that_work_from_its_lines_and_from_what_
     let (between, covariance) = (0.4e-6, covariance());
     let model = model(machine(between)).with_covariance(Some(known(&covariance)));
     let now = now(&model, COLD, &state());
-    let stated = model.standard_uncertainty(AT, &now, U_DISPLACEMENT, U_ROLL, &U_KELVIN);
+    let seen = Seen {
+        displacement: [U_DISPLACEMENT; 3],
+        roll: [U_ROLL; 3],
+        temperatures: &U_KELVIN,
+    };
+    let stated = model.standard_uncertainty(AT, &now, &seen);
     let stated = array(stated.expect("it is within"));
-    let budget = model.uncertainty_budget(AT, &now, U_DISPLACEMENT, U_ROLL, &U_KELVIN);
+    let budget = model.uncertainty_budget(AT, &now, &seen);
     let budget = budget.expect("much is uncertain");
     let combined = |k: usize| {
         let it = budget.at(k);

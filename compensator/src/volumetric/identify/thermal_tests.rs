@@ -3,7 +3,7 @@ use units::Celsius;
 use super::tests::{Chance, OFFSET, machine, model, nodes, plan, um};
 use super::*;
 use crate::volumetric::function::Shape;
-use crate::volumetric::model::{Thermal, ThermalBend, ThermalChannel, VolumetricModel};
+use crate::volumetric::model::{Seen, Thermal, ThermalBend, ThermalChannel, VolumetricModel};
 use crate::volumetric::online::{DetectorLever, MovingState};
 
 /// Cold, and two hours later: over and under the neutral plane.
@@ -213,7 +213,7 @@ fn a_machine_that_works_warm_states_what_errors_and_coefficients_are_uncertain_b
         let mut sum = 0.0;
         for x in &places {
             let at = Point::new(*x, Metres(0.0), Metres(0.0));
-            let stated = model.standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[]);
+            let stated = model.standard_uncertainty(at, &now, &Seen::default());
             let expected = found.standard_uncertainty(at, tool(), &warmth).unwrap();
             let between = expected.distance().value();
             let stated = stated.unwrap().distance().value();

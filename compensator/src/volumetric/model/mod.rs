@@ -57,6 +57,7 @@ pub use extreme::Extreme;
 pub use refusal::{ConditionsError, ModelError};
 pub(in crate::volumetric) use thermal::Arc;
 pub use thermal::{Thermal, ThermalBend, ThermalChannel};
+pub use uncertainty::Seen;
 
 use super::inverse::deviation_at_target;
 use super::online::MovingState;

@@ -161,7 +161,7 @@ fn temperatures_expand_grow_and_lean() {
     check_um(model.deviation(at, &now).unwrap(), [8.0 + 0.8, 0.0, 6.0]);
     // 0.1 K: 4 µm/K + 0.4 µm/K along x at once, 3 µm/K along z.
     let u = model
-        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[])
+        .standard_uncertainty(at, &now, &Seen::default())
         .unwrap();
     check_um(u, [0.44, 0.0, 0.3]);
     let hot = model.conditions(Point::ZERO, &[Celsius(31.0)], &live);
@@ -254,7 +254,7 @@ fn a_bends_uncertainty_is_that_of_its_bow_and_of_both_thermometers() {
             .conditions(tool, &temperatures, &MovingState::default())
             .unwrap();
         let u = model
-            .standard_uncertainty(Point::ZERO, &now, Metres::ZERO, Radians::ZERO, &[])
+            .standard_uncertainty(Point::ZERO, &now, &Seen::default())
             .unwrap();
         check_um(u, [expected, 0.0, 0.0]);
     }
@@ -275,8 +275,11 @@ fn a_thermometer_that_says_nothing_leaves_what_a_bend_is_known_for() {
         ([0.05, 8.0], limit / 3.0_f64.sqrt()),
         ([8.0, 8.0], limit / 3.0_f64.sqrt()),
     ] {
-        let (none, roll) = (Metres::ZERO, Radians::ZERO);
-        let u = model.standard_uncertainty(Point::ZERO, &now, none, roll, &u_kelvin);
+        let seen = Seen {
+            temperatures: &u_kelvin,
+            ..Seen::default()
+        };
+        let u = model.standard_uncertainty(Point::ZERO, &now, &seen);
         check_um(u.unwrap(), [3.2 * expected, 0.0, 0.0]);
     }
 }
@@ -293,7 +296,7 @@ fn an_uncertain_expansion_makes_a_warm_machine_uncertain() {
     for (warm, expected) in [([22.0, 24.0], 1.2), ([22.0, 18.0], 0.0)] {
         let now = model.conditions(Point::ZERO, &warm.map(Celsius), &MovingState::default());
         let u = model
-            .standard_uncertainty(at, &now.unwrap(), Metres::ZERO, Radians::ZERO, &[])
+            .standard_uncertainty(at, &now.unwrap(), &Seen::default())
             .unwrap();
         check_um(u, [expected, 0.0, 0.0]);
     }
@@ -360,14 +363,21 @@ fn uncertainties_combine_with_their_levers() {
     let now = still(&model, Point::ZERO);
     let at = Point::from_mm(400.0, 0.0, 0.0);
     let u = model
-        .standard_uncertainty(at, &now, Metres::ZERO, Radians::ZERO, &[])
+        .standard_uncertainty(at, &now, &Seen::default())
         .unwrap();
     check_um(u, [0.0, 0.5, 0.0]);
     // Detectors: each sideways direction is displaced by two sliders.
-    let u = model
-        .standard_uncertainty(at, &now, um(0.1), Radians::ZERO, &[])
-        .unwrap();
-    check_um(u, [0.02_f64.sqrt(), 0.27_f64.sqrt(), 0.02_f64.sqrt()]);
+    let by = |displacement: [f64; 3]| {
+        let seen = Seen {
+            displacement: displacement.map(um),
+            ..Seen::default()
+        };
+        model.standard_uncertainty(at, &now, &seen).unwrap()
+    };
+    let all = by([0.1; 3]);
+    check_um(all, [0.02_f64.sqrt(), 0.27_f64.sqrt(), 0.02_f64.sqrt()]);
+    // That of x displaces along y and z alone.
+    check_um(by([0.1, 0.0, 0.0]), [0.0, 0.26_f64.sqrt(), 0.1]);
 }
 
 /// By trying places all over the volume: none is beyond the one found, and it is one of them.

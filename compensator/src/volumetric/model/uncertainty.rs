@@ -30,12 +30,16 @@ enum Input {
     Bend(Axis, Axis),
 }
 
-/// What is known of this moment: the standard uncertainties of displacements and rolls that detectors see, and of
+/// What is known of this moment: the standard uncertainties of what detectors see of the slides of x, y and z, and of
 /// temperatures in kelvin by channel.
-struct Now<'a> {
-    displacement: Metres,
-    roll: Radians,
-    temperatures: &'a [f64],
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen<'a> {
+    /// Of displacements, along both directions across the axis.
+    pub displacement: [Metres; 3],
+    /// Of rolls.
+    pub roll: [Radians; 3],
+    /// Of what thermometers show; one beyond the end is as sure as it says of itself.
+    pub temperatures: &'a [f64],
 }
 
 impl VolumetricModel {
@@ -44,9 +48,8 @@ impl VolumetricModel {
     /// displacements and rolls. Functions, squarenesses and thermal coefficients have in common what
     /// [`Self::with_covariance`] says of them; all else is taken as independent.
     ///
-    /// `u_temperatures`, in kelvin by channel, are what the temperatures are known to now; a channel
-    /// beyond their end is as sure as it says of itself. A gradient is never less sure than that it
-    /// is within what its bend is known for.
+    /// `seen` is what all is known to now. A gradient is never less sure than that it is within what its bend is
+    /// known for.
     ///
     /// # Errors
     /// When the command is outside the volume by more than the limit of size.
@@ -54,18 +57,11 @@ impl VolumetricModel {
         &self,
         command: Point,
         now: &Conditions,
-        u_displacement: Metres,
-        u_roll: Radians,
-        u_temperatures: &[f64],
+        seen: &Seen<'_>,
     ) -> Result<Point, NoCorrection> {
         self.commands.check(command)?;
         let mut squares = self.variances_in_common(command, now).unwrap_or([0.0; 3]);
-        let known = Now {
-            displacement: u_displacement,
-            roll: u_roll,
-            temperatures: u_temperatures,
-        };
-        self.each_input(command, now, &known, |_, effect, u| {
+        self.each_input(command, now, seen, |_, effect, u| {
             for k in 0..3 {
                 squares[k] += effect[k] * effect[k] * u * u;
             }
@@ -118,7 +114,7 @@ impl VolumetricModel {
         &self,
         command: Point,
         now: &Conditions,
-        known: &Now<'_>,
+        seen: &Seen<'_>,
         mut each: impl FnMut(Input, V3, f64),
     ) {
         let is_known = self.covariance.is_some();
@@ -137,9 +133,10 @@ impl VolumetricModel {
                 each(Input::Errors, turns, u_at_nodes(about, position, is_known));
                 each(Input::Between, turns, u_between(about, position, is_known));
                 if direction == axis {
-                    each(Input::Roll(axis), turns, known.roll.value());
+                    each(Input::Roll(axis), turns, seen.roll[axis.index()].value());
                 } else {
-                    each(Input::Displacement(axis), moves, known.displacement.value());
+                    let u = seen.displacement[axis.index()];
+                    each(Input::Displacement(axis), moves, u.value());
                 }
             }
         }
@@ -150,7 +147,7 @@ impl VolumetricModel {
             let leans = lean_effect(Squareness::lean(one), command);
             each(Input::Errors, leans, u.value());
         }
-        self.each_warmth(command, now, known, each);
+        self.each_warmth(command, now, seen, each);
     }
 
     /// The same of temperatures, and of what is known of their effects.
@@ -158,13 +155,13 @@ impl VolumetricModel {
         &self,
         command: Point,
         now: &Conditions,
-        known: &Now<'_>,
+        seen: &Seen<'_>,
         mut each: impl FnMut(Input, V3, f64),
     ) {
         let thermal = &self.machine.thermal;
         let way = (command - thermal.fixed).array();
         let u_of_channel = |at: usize| {
-            let known = known.temperatures.get(at).copied();
+            let known = seen.temperatures.get(at).copied();
             known.unwrap_or(thermal.channels[at].u)
         };
         for at in 0..thermal.channels.len() {

@@ -59,6 +59,7 @@ fn settings() -> FeedSettings {
         blend: Duration::from_secs(1),
         confirm: 3,
         smoothing: Duration::from_millis(100),
+        repeats: 1,
     }
 }
 

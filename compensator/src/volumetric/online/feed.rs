@@ -14,6 +14,7 @@
 use core::fmt;
 use core::time::Duration;
 
+use units::portable::powi;
 use units::{Quantity, Time};
 
 use super::Trouble;
@@ -28,6 +29,10 @@ pub enum Reaction {
     /// It stays, and the machine is to stop.
     Stop,
 }
+
+/// The time constant by which a lag is followed, in units of that of what lags. Followed as slowly as the value itself,
+/// a lag that has ended would seem to last: three time constants after its end four times of what is left of it.
+const LAG_CONSTANT: f64 = 0.5;
 
 /// How a feed treats its detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +49,9 @@ pub struct FeedSettings {
     /// Time constant by which good values are smoothed against noise; zero for none. What the
     /// detectors see beyond their references changes over minutes, and little along the axes.
     pub smoothing: Duration,
+    /// How often each sample is given in a row, 1 where each is given once: noise that stays for several values is
+    /// smoothed less than noise that is another in each.
+    pub repeats: u32,
 }
 
 /// What stands behind the value a feed gives out.
@@ -114,8 +122,10 @@ pub struct Feed<Q, const N: usize> {
     last: Time,
     /// What is wanted while nothing good comes.
     held: [Q; N],
-    /// How far smoothing lags behind, itself smoothed: noise alone is no lag.
+    /// How far smoothing lags behind, itself smoothed.
     lag: [Q; N],
+    /// What noise makes of it.
+    noise: [LagNoise; N],
     output: [Q; N],
     /// Output − wanted when what is wanted changed its origin, and how it shrinks from there.
     offset: [Q; N],
@@ -134,6 +144,7 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
             last: Time::ZERO,
             held: [Q::ZERO; N],
             lag: [Q::ZERO; N],
+            noise: [LagNoise::default(); N],
             output: [Q::ZERO; N],
             offset: [Q::ZERO; N],
             since: Time::ZERO,
@@ -211,10 +222,14 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     }
 
     /// How far the values given out last are from what was wanted then, by the largest: next to
-    /// nothing but while one blends into the other, smoothing lags behind or one fades out.
+    /// nothing but while one blends into the other, smoothing lags behind or one fades out. What noise
+    /// makes of a lag is taken off in the mean square: it is part of what is stated of the detector.
     pub fn left(&self) -> Q {
         let each = self.output.iter().zip(&self.held).zip(&self.lag);
-        let each = each.map(|((output, held), lag)| (*output - *held).abs() + lag.abs());
+        let each = each.zip(&self.noise);
+        let each = each.map(|(((output, held), lag), noise)| {
+            (*output - *held).abs() + Q::from_value(noise.beyond(lag.value()))
+        });
         each.fold(Q::ZERO, Q::max)
     }
 
@@ -300,15 +315,20 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         } else {
             1.0
         };
-        self.held = core::array::from_fn(|i| self.held[i] + (value[i] - self.held[i]) * share);
-        self.lag =
-            core::array::from_fn(|i| self.lag[i] + (value[i] - self.held[i] - self.lag[i]) * share);
+        let quick = share / (share + (1.0 - share) * LAG_CONSTANT);
+        let repeats = self.settings.repeats.max(1);
+        for (i, value) in value.into_iter().enumerate() {
+            self.held[i] = self.held[i] + (value - self.held[i]) * share;
+            self.lag[i] = self.lag[i] + (value - self.held[i] - self.lag[i]) * quick;
+            self.noise[i].take(value.value(), (share, quick), repeats);
+        }
     }
 
     /// From now on `wanted` is wanted, reached over `over` from what was given out last.
     fn turn_to(&mut self, now: Time, wanted: [Q; N], over: Duration) {
         self.held = wanted;
         self.lag = [Q::ZERO; N];
+        self.noise = [LagNoise::default(); N];
         self.offset = core::array::from_fn(|i| self.output[i] - wanted[i]);
         self.since = now;
         self.over = over;
@@ -324,5 +344,145 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         };
         self.output = core::array::from_fn(|i| self.held[i] + self.offset[i] * left);
         self.output
+    }
+}
+
+/// What the noise of samples makes of a lag, told by how they change from one to the next: what a machine sees on its
+/// way changes little from sample to sample, and much over the time that smoothing takes.
+#[derive(Clone, Copy, Debug, Default)]
+struct LagNoise {
+    last: Option<f64>,
+    /// The mean square of changes from value to value.
+    changes: f64,
+    /// The mean square of the lag by noise.
+    square: f64,
+}
+
+impl LagNoise {
+    /// Takes a value that was smoothed by the first of `shares`, its lag by the second; each sample is given `repeats`
+    /// times.
+    ///
+    /// White noise of variance σ² goes through a low pass of pole a, whose output is taken off it, and one of pole b:
+    /// (1 − b)²·a²·2σ²/((1 − ab)(1 + a)(1 + b)) is left, the poles being those from sample to sample. A sample that stays for
+    /// n values changes them by 2σ²/n in the mean square.
+    fn take(&mut self, value: f64, (share, quick): (f64, f64), repeats: u32) {
+        if share <= 0.0 {
+            return;
+        }
+        let change = self.last.map_or(0.0, |last| value - last);
+        self.last = Some(value);
+        self.changes += (change * change - self.changes) * share;
+        let pole = |share: f64| powi(1.0 - share, i32::try_from(repeats).unwrap_or(i32::MAX));
+        let (a, b) = (pole(share), pole(quick));
+        let passed = powi((1.0 - b) * a, 2) / ((1.0 - a * b) * (1.0 + a) * (1.0 + b));
+        self.square = self.changes * f64::from(repeats) * passed;
+    }
+
+    /// How much of a lag is not noise.
+    fn beyond(&self, lag: f64) -> f64 {
+        (lag * lag - self.square).max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::Noise;
+
+    const SMOOTHING: Duration = Duration::from_millis(100);
+
+    fn feed(repeats: u32) -> Feed<units::Metres, 1> {
+        Feed::new(FeedSettings {
+            patience: Duration::ZERO,
+            reaction: Reaction::Hold,
+            blend: Duration::ZERO,
+            confirm: 1,
+            smoothing: SMOOTHING,
+            repeats,
+        })
+    }
+
+    /// Values each 2 ms, by `value` of milliseconds, that each stay so often, with noise of 1; what `seen` makes of the
+    /// feed after each.
+    fn each_told(
+        repeats: u32,
+        value: impl Fn(u64) -> f64,
+        mut seen: impl FnMut(u64, &Feed<units::Metres, 1>),
+    ) {
+        let (mut feed, mut noise, mut now) = (feed(repeats), Noise(77), 0.0);
+        for at in 0..100_000_u64 {
+            if at.is_multiple_of(repeats.into()) {
+                now = value(2 * at) + noise.normal();
+            }
+            let time = Time::ZERO + Duration::from_millis(2 * at);
+            feed.advance(time, Ok([units::Metres(now)]));
+            seen(2 * at, &feed);
+        }
+    }
+
+    #[test]
+    fn noise_makes_as_much_of_a_lag_as_is_told_however_often_a_sample_is_given() {
+        for repeats in [1, 3, 10] {
+            let (mut does, mut told) = (0.0, 0.0);
+            each_told(
+                repeats,
+                |_| 0.0,
+                |_, it| {
+                    does += it.lag[0].value().powi(2);
+                    told += it.noise[0].square;
+                },
+            );
+            let ratio = does / told;
+            assert!((0.85..1.15).contains(&ratio), "{repeats}: {ratio}");
+        }
+    }
+
+    /// What is left by noise alone is half of what its lag is, in the mean square: where that is less than it is in the
+    /// mean, nothing is taken off.
+    #[test]
+    fn of_noise_little_is_left() {
+        let (mut left, mut lag, mut count) = (0.0, 0.0, 0.0);
+        each_told(
+            10,
+            |_| 0.0,
+            |_, it| {
+                left += it.left().value().powi(2);
+                lag += it.lag[0].value().powi(2);
+                count += 1.0;
+            },
+        );
+        assert!(left < 0.7 * lag, "{left} {lag}");
+        assert!(left / count < 0.09, "{}", left / count);
+    }
+
+    /// A way of which 200 units a second are seen, for a second, and a rest as long: the value lags behind by 20 on the
+    /// way, and three time constants after its end by one.
+    #[test]
+    fn what_is_left_of_a_way_is_told_on_it_and_when_it_ends() {
+        let at_ms = |ms: u64| 0.2 * (ms % 2000).min(1000) as f64;
+        let turns = |ms: u64| {
+            if (ms / 2000).is_multiple_of(2) {
+                at_ms(ms)
+            } else {
+                200.0 - at_ms(ms)
+            }
+        };
+        let (mut on_the_way, mut at_rest, mut count) = (0.0, 0.0, 0.0);
+        each_told(10, turns, |ms, it| {
+            if ms < 4000 {
+                return;
+            }
+            match ms % 2000 {
+                900 => {
+                    on_the_way += it.left().value();
+                    count += 1.0;
+                }
+                1300 => at_rest += it.left().value().powi(2),
+                _ => {}
+            }
+        });
+        let (on_the_way, at_rest) = (on_the_way / count, (at_rest / count).sqrt());
+        assert!((18.0..23.0).contains(&on_the_way), "{on_the_way}");
+        assert!((1.0..3.0).contains(&at_rest), "{at_rest}");
     }
 }

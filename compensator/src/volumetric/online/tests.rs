@@ -361,6 +361,7 @@ fn settings(reaction: Reaction) -> FeedSettings {
         blend: millis(10),
         confirm: 1,
         smoothing: Duration::ZERO,
+        repeats: 1,
     }
 }
 
@@ -524,6 +525,7 @@ fn noise_is_smoothed_and_confirmation_waited_for() {
         blend: Duration::ZERO,
         confirm: 2,
         smoothing: millis(3),
+        repeats: 1,
     });
     check_um(feed.advance(ms(0), Ok([um(5.0)]))[0], 0.0);
     check_um(feed.advance(ms(1), Ok([um(0.0)]))[0], 0.0);

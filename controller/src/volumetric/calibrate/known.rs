@@ -5,10 +5,10 @@
 
 use compensator::volumetric::Axis;
 use compensator::volumetric::identify::{ExpansionPlan, Observation, Reading};
-use compensator::volumetric::model::{Chain, Machine as Model, VolumetricModel};
+use compensator::volumetric::model::{Chain, Machine as Model, Seen, VolumetricModel};
 use compensator::volumetric::online::MovingState;
 use units::portable::powi;
-use units::{Celsius, Metres, Radians};
+use units::{Celsius, Metres};
 
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::VolumetricFailure;
@@ -82,7 +82,7 @@ impl Known {
         };
         let (model, at) = (&self.model, observation.at);
         let now = model.conditions(observation.tool, temperatures, &seen.state)?;
-        let u_seen = model.standard_uncertainty(at, &now, Metres(0.0), Radians(0.0), &[])?;
+        let u_seen = model.standard_uncertainty(at, &now, &Seen::default())?;
         let u_displacement = seen.u_displacement;
         let seen = model.deviation(at, &now)?;
         let (mut part, mut square) = (0.0, u.value() * u.value());
@@ -117,6 +117,7 @@ pub(super) fn expansion_plans(config: &VolumetricConfig) -> Vec<ExpansionPlan> {
 mod tests {
     use crate::Edit;
     use compensator::volumetric::Point;
+    use units::Radians;
 
     use super::*;
 

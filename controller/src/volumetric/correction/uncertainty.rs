@@ -2,10 +2,10 @@
 
 use compensator::budget::PlacesBudget;
 use compensator::volumetric::Point;
-use compensator::volumetric::model::Conditions;
+use compensator::volumetric::model::{Conditions, Seen};
 use compensator::volumetric::online::FeedStatus;
 use units::portable::hypot;
-use units::{Metres, Quantity, Radians};
+use units::{Metres, Radians};
 
 use crate::volumetric::correction::{VolumetricCorrection, per_axis};
 use crate::volumetric::thermometers::Thermometers;
@@ -13,42 +13,45 @@ use machine::engine::{AXES_MAX, PerAxis};
 
 impl VolumetricCorrection {
     /// Of a displacement that nobody sees nothing is known but that it is no larger than the
-    /// largest permitted; one that blends in is off by what is left of that.
-    fn u_displacement(&self) -> Metres {
+    /// largest permitted; one that blends in is off by what is left of that. A slide without a beam counts as
+    /// the worst of the others at their best.
+    fn u_displacement(&self) -> [Metres; 3] {
         let largest = self.model.machine().displacement_max / 3.0_f64.sqrt();
-        let beams = self.beams.iter().flatten();
-        let each = beams.map(|it| {
+        let mut each = self.u_displacement;
+        for (u, beam) in each.iter_mut().zip(&self.beams) {
+            let Some(it) = beam else {
+                continue;
+            };
             let (slider, end) = it.monitor.status();
-            if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
-                let left = it.monitor.left().value();
-                Metres(hypot(self.u_displacement.value(), left))
+            *u = if slider == FeedStatus::Good && end.is_none_or(|it| it == FeedStatus::Good) {
+                Metres(hypot(u.value(), it.monitor.left().value()))
             } else {
-                largest
-            }
-        });
-        each.fold(self.u_displacement, Quantity::max)
+                largest.max(*u)
+            };
+        }
+        each
     }
 
     /// Likewise of a roll.
-    fn u_roll(&self) -> Radians {
+    fn u_roll(&self) -> [Radians; 3] {
         let largest = self.model.machine().roll_max / 3.0_f64.sqrt();
-        let each = self.rolls.iter().flatten().map(|it| {
-            if it.monitor.status() == FeedStatus::Good {
-                let left = it.monitor.left().value();
-                Radians(hypot(self.u_roll.value(), left))
+        let mut each = self.u_roll;
+        for (u, roll) in each.iter_mut().zip(&self.rolls) {
+            let Some(it) = roll else {
+                continue;
+            };
+            *u = if it.monitor.status() == FeedStatus::Good {
+                Radians(hypot(u.value(), it.monitor.left().value()))
             } else {
-                largest
-            }
-        });
-        each.fold(self.u_roll, Quantity::max)
+                largest.max(*u)
+            };
+        }
+        each
     }
 
     /// The standard uncertainties at `command`.
     pub(super) fn uncertainty(&self, command: Point, now: &Conditions) -> PerAxis<Metres> {
-        let (displacement, roll, temperatures) = self.u_of_inputs();
-        let u = self
-            .model
-            .standard_uncertainty(command, now, displacement, roll, temperatures);
+        let u = self.model.standard_uncertainty(command, now, &self.seen());
         u.map_or([Metres(f64::NAN); AXES_MAX], per_axis)
     }
 
@@ -56,15 +59,16 @@ impl VolumetricCorrection {
     /// `None` where none was given, and where nothing is uncertain.
     pub fn budget(&self) -> Option<PlacesBudget<Metres>> {
         let (command, now) = self.given.as_ref()?;
-        let (displacement, roll, temperatures) = self.u_of_inputs();
-        self.model
-            .uncertainty_budget(*command, now, displacement, roll, temperatures)
+        self.model.uncertainty_budget(*command, now, &self.seen())
     }
 
-    /// Of displacements, rolls and temperatures, as they are known now.
-    fn u_of_inputs(&self) -> (Metres, Radians, &[f64]) {
+    /// What displacements, rolls and temperatures are known to now.
+    fn seen(&self) -> Seen<'_> {
         let temperatures = self.thermometers.as_ref();
-        let u_temperatures = temperatures.map_or(&[][..], Thermometers::u_kelvin);
-        (self.u_displacement(), self.u_roll(), u_temperatures)
+        Seen {
+            displacement: self.u_displacement(),
+            roll: self.u_roll(),
+            temperatures: temperatures.map_or(&[][..], Thermometers::u_kelvin),
+        }
     }
 }

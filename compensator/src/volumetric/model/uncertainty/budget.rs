@@ -1,9 +1,9 @@
 //! The uncertainty of the deviation as a budget: which input makes how much of it, along x, y and z.
 
-use units::{Metres, Radians};
+use units::Metres;
 
 use super::super::{Conditions, VolumetricModel};
-use super::{Input, Now, unit};
+use super::{Input, Seen, unit};
 use crate::budget::{Contribution, Correlation, Evaluation, PlacesBudget};
 use crate::volumetric::point::V3;
 use crate::volumetric::{Axis, Point};
@@ -28,9 +28,7 @@ impl VolumetricModel {
         &self,
         command: Point,
         now: &Conditions,
-        u_displacement: Metres,
-        u_roll: Radians,
-        u_temperatures: &[f64],
+        seen: &Seen<'_>,
     ) -> Option<PlacesBudget<Metres>> {
         self.commands.check(command).ok()?;
         let mut lines: Vec<Line> = Vec::new();
@@ -50,12 +48,7 @@ impl VolumetricModel {
                 add(Input::Errors, unit(axis), variance.sqrt());
             }
         }
-        let known = Now {
-            displacement: u_displacement,
-            roll: u_roll,
-            temperatures: u_temperatures,
-        };
-        self.each_input(command, now, &known, &mut add);
+        self.each_input(command, now, seen, &mut add);
         lines.retain(|it| it.squares.iter().any(|square| *square > 0.0));
         if lines.is_empty() {
             return None;
