@@ -22,6 +22,7 @@ mod quantity;
 mod request;
 mod scribe;
 mod snapshot;
+mod system_log;
 mod thread;
 mod view;
 

@@ -191,7 +191,7 @@ fn status(snapshot: &Snapshot, fixed: &Fixed) -> String {
 }
 
 /// Each line of a message is a message of its own.
-fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     text.split(char::is_control).collect::<Vec<_>>().join(" ")
 }
 

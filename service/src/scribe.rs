@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
 use crate::desk::Desk;
+use crate::system_log::SystemLog;
 
 /// How often it looks: the snapshot keeps far more events than happen meanwhile.
 const EVERY: Duration = Duration::from_millis(50);
@@ -34,11 +35,13 @@ impl Scribe {
             .name("scribe".into())
             .spawn(move || {
                 let mut newest = 0;
+                let mut log = SystemLog::of_environment();
                 loop {
                     let is_last = seen.load(Ordering::Acquire);
                     // A disk that is full or gone must not end the service; the next look tries again.
                     let _ = desk.write_ends();
                     let _ = write_events(&desk, &folder, &mut newest);
+                    log.iter_mut().for_each(|it| it.tell(&desk));
                     if is_last {
                         return;
                     }

@@ -4,9 +4,12 @@
 use nix::pty::{OpenptyResult, openpty};
 use nix::sys::termios::{BaudRate, SetArg, cfgetospeed, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
-use std::fs::File;
+use std::fs::{File, Permissions};
 use std::io::{Read as _, Write as _};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
+use std::process::{self, Stdio};
 use std::thread::JoinHandle;
 use wire::LineControl;
 use wire::LinkState;
@@ -201,6 +204,29 @@ fn two_ports_of_one_number_are_refused() {
         twice,
         Err(OpenError::DuplicatePort { port: PORT })
     ));
+}
+
+/// Root opens it in any case, so that somebody else tries.
+fn another_can_open(pty: &Pty) -> bool {
+    const NOBODY: u32 = 65_534;
+    let mut other = process::Command::new("sh");
+    other.args(["-c", "exec 3<>\"$0\""]).arg(&pty.path);
+    other.stderr(Stdio::null());
+    if std::fs::metadata(&pty.path).unwrap().uid() == 0 {
+        let everybody = Permissions::from_mode(0o666);
+        std::fs::set_permissions(&pty.path, everybody).unwrap();
+        other.uid(NOBODY);
+    }
+    other.status().unwrap().success()
+}
+
+#[test]
+fn a_line_is_for_one_program_and_for_the_next_once_it_was_given_back() {
+    let pty = Pty::new();
+    let live = serial(&pty);
+    assert!(!another_can_open(&pty), "it is open");
+    drop(live);
+    assert!(another_can_open(&pty), "it was given back");
 }
 
 #[test]

@@ -26,6 +26,8 @@ mod one_core;
 #[cfg(feature = "live")]
 mod open_error;
 #[cfg(feature = "live")]
+mod open_line;
+#[cfg(feature = "live")]
 mod os;
 #[cfg(feature = "live")]
 mod processors;

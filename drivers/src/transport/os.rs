@@ -3,11 +3,11 @@
 #![expect(
     unsafe_code,
     reason = "serialport gives its descriptor away only as a number, and nix has neither \
-              sched_setscheduler, setpriority nor TIOCSBRK"
+              sched_setscheduler, setpriority, TIOCSBRK nor TIOCNXCL"
 )]
 
 use nix::errno::Errno;
-use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, FromRawFd, IntoRawFd, OwnedFd};
 
 /// Takes over the descriptor of an open port.
 pub(super) fn take_descriptor(port: impl IntoRawFd) -> OwnedFd {
@@ -60,9 +60,16 @@ pub(super) fn give_way() -> Result<(), Errno> {
 ///
 /// # Errors
 /// ENOTTY where there is no line.
-pub(super) fn set_break(descriptor: &OwnedFd, on: bool) -> Result<(), Errno> {
+pub(super) fn set_break(descriptor: &impl AsFd, on: bool) -> Result<(), Errno> {
     let request = if on { libc::TIOCSBRK } else { libc::TIOCCBRK };
     // SAFETY: the descriptor is open as long as it is borrowed; both requests take no argument.
-    let result = unsafe { libc::ioctl(descriptor.as_raw_fd(), request) };
+    let result = unsafe { libc::ioctl(descriptor.as_fd().as_raw_fd(), request) };
     Errno::result(result).map(drop)
+}
+
+/// Lets others open a serial line that was opened for this program alone.
+pub(super) fn give_back(descriptor: &impl AsFd) {
+    // SAFETY: the descriptor is open as long as it is borrowed; the request takes no argument.
+    // What is no terminal any more is nobody's.
+    let _ = unsafe { libc::ioctl(descriptor.as_fd().as_raw_fd(), libc::TIOCNXCL) };
 }

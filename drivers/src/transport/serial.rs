@@ -6,7 +6,7 @@ use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::sys::termios::{BaudRate, SetArg, cfsetspeed, tcgetattr, tcsetattr};
 use std::collections::VecDeque;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
 use tokio_serial::SerialPort as _;
 use units::Time;
@@ -16,6 +16,7 @@ use wire::{Input, LinkState, Payload, Port};
 use super::SendError;
 use super::clock::Clock;
 use super::live_port::{LivePort, awaited, system};
+use super::open_line::OpenLine;
 use super::os;
 
 const READ_MAX: usize = 4_096;
@@ -82,7 +83,7 @@ pub(super) struct SerialError {
 }
 
 /// Opens and sets up a serial line; reads and writes on it never wait.
-pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OwnedFd, SerialError> {
+pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OpenLine, SerialError> {
     let data_bits = match settings.data_bits {
         5 => tokio_serial::DataBits::Five,
         6 => tokio_serial::DataBits::Six,
@@ -113,7 +114,7 @@ pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OwnedFd, Ser
     }
     // What came before the settings did may be garbled.
     let _ = port.clear(tokio_serial::ClearBuffer::Input);
-    let descriptor = os::take_descriptor(port);
+    let descriptor = OpenLine::new(os::take_descriptor(port));
     fcntl(&descriptor, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|errno| SerialError {
         source: errno.into(),
         help: "this is not a serial line (terminal device)",
@@ -142,7 +143,7 @@ fn is_denied(error: &std::io::Error) -> bool {
 }
 
 /// Another rate for a line that is open.
-fn set_baud(descriptor: &OwnedFd, baud: u32) -> Result<(), Errno> {
+fn set_baud(descriptor: &OpenLine, baud: u32) -> Result<(), Errno> {
     let rate = match baud {
         4_800 => BaudRate::B4800,
         9_600 => BaudRate::B9600,
@@ -161,7 +162,7 @@ fn set_baud(descriptor: &OwnedFd, baud: u32) -> Result<(), Errno> {
 /// Bytes on their way out; what a slow line does not take at once is kept, in order.
 #[derive(Debug)]
 pub(super) struct Outbox {
-    descriptor: Option<Arc<OwnedFd>>,
+    descriptor: Option<Arc<OpenLine>>,
     pending: VecDeque<u8>,
     limit: usize,
     /// Bytes that were written or kept so far.
@@ -184,7 +185,7 @@ impl Outbox {
     }
 
     /// From now on to this descriptor; what was pending is forgotten.
-    pub(super) fn connect(&mut self, descriptor: Option<Arc<OwnedFd>>) {
+    pub(super) fn connect(&mut self, descriptor: Option<Arc<OpenLine>>) {
         self.descriptor = descriptor;
         self.pending.clear();
     }
@@ -241,7 +242,7 @@ pub(super) enum Read {
 }
 
 /// Reads what is there.
-pub(super) fn read(descriptor: &OwnedFd) -> Read {
+pub(super) fn read(descriptor: &OpenLine) -> Read {
     let mut buffer = [0; READ_MAX];
     match read_into(descriptor, &mut buffer) {
         None => Read::Gone,
@@ -252,7 +253,7 @@ pub(super) fn read(descriptor: &OwnedFd) -> Read {
 
 /// Waits until `count` bytes have come, which are known to be on their way; fewer when the
 /// device vanished or they do not come.
-pub(super) fn read_exactly(descriptor: &OwnedFd, count: usize) -> Vec<u8> {
+pub(super) fn read_exactly(descriptor: &OpenLine, count: usize) -> Vec<u8> {
     let mut bytes = vec![0; count];
     let mut filled = 0;
     while filled < count {
@@ -267,7 +268,7 @@ pub(super) fn read_exactly(descriptor: &OwnedFd, count: usize) -> Vec<u8> {
 }
 
 /// How many bytes were there; `None` when the device vanished.
-fn read_into(descriptor: &OwnedFd, buffer: &mut [u8]) -> Option<usize> {
+fn read_into(descriptor: &OpenLine, buffer: &mut [u8]) -> Option<usize> {
     match nix::unistd::read(descriptor, buffer) {
         // A pty whose other side was closed reads as 0 bytes or EIO.
         Ok(0) => None,
@@ -318,7 +319,7 @@ pub(super) struct SerialLine {
     clock: Clock,
     path: String,
     settings: SerialSettings,
-    descriptor: Option<Arc<OwnedFd>>,
+    descriptor: Option<Arc<OpenLine>>,
     outbox: Outbox,
     back_off: BackOff,
     queued: VecDeque<(Time, Input)>,

@@ -14,7 +14,7 @@ mod start;
 use core::time::Duration;
 use nix::errno::Errno;
 use std::collections::VecDeque;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
 use units::Time;
 use wire::slcan::{BitrateCode, Command, LineBuffer, Reply, StatusFlags};
@@ -28,6 +28,7 @@ use super::SendError;
 use super::clock::Clock;
 use super::live_port::{LivePort, system};
 use super::open_error::OpenError;
+use super::open_line::OpenLine;
 use super::serial::{self, BackOff, Read};
 use super::stamps::AdapterStamps;
 use super::sync_thread::SyncSink;
@@ -50,7 +51,7 @@ pub(super) struct SlcanPort {
     path: String,
     settings: SlcanSettings,
     bitrate: BitrateCode,
-    descriptor: Option<Arc<OwnedFd>>,
+    descriptor: Option<Arc<OpenLine>>,
     lines: Arc<SharedLines>,
     buffer: LineBuffer,
     state: State,

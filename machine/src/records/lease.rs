@@ -2,6 +2,7 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::PathBuf;
 
 use nix::fcntl::{Flock, FlockArg};
 
@@ -37,7 +38,7 @@ impl Lease {
     /// # Errors
     /// When another program has it (its name is told), or the lock file cannot be made.
     pub fn take(store: &Store, verb: &str) -> Result<Self, StoreError> {
-        let path = store.root().join("lease");
+        let path = path_of(store);
         fs::create_dir_all(store.root()).map_err(io_error("create the folder", store.root()))?;
         let file = OpenOptions::new()
             .read(true)
@@ -45,7 +46,7 @@ impl Lease {
             .create(true)
             .truncate(false)
             .open(&path)
-            .map_err(io_error("open", &path))?;
+            .map_err(|error| not_opened(store, error))?;
         match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
             Ok(mut lock) => {
                 name_owner(&mut lock, verb).map_err(io_error("write", &path))?;
@@ -60,7 +61,7 @@ impl Lease {
 
     /// Who has the machine, and where its owner can be asked; `None` when nobody has it. Nothing is made or written.
     pub fn owner(store: &Store) -> Option<(String, Vec<String>)> {
-        let file = File::open(store.root().join("lease")).ok()?;
+        let file = File::open(path_of(store)).ok()?;
         match Flock::lock(file, FlockArg::LockSharedNonblock) {
             Ok(_) => None,
             Err((mut file, _)) => Some(said_in(&mut file)),
@@ -75,6 +76,19 @@ impl Lease {
         let mut file: &File = &self.lock;
         let lines: String = places.iter().map(|it| format!("{PLACE}{it}\n")).collect();
         file.write_all(lines.as_bytes())
+    }
+}
+
+fn path_of(store: &Store) -> PathBuf {
+    store.root().join("lease")
+}
+
+/// Why it cannot be opened for writing. Who may only read it can still ask its owner, as those in the group of a
+/// service do.
+fn not_opened(store: &Store, error: io::Error) -> StoreError {
+    match Lease::owner(store) {
+        Some((owner, places)) => StoreError::Leased { owner, places },
+        None => io_error("open", &path_of(store))(error),
     }
 }
 
@@ -146,6 +160,19 @@ mod tests {
         // What it said is gone with it.
         let _second = Lease::take(&store, "calibrate").unwrap();
         assert!(of_second().1.is_empty());
+    }
+
+    #[test]
+    fn who_may_not_write_the_lease_is_told_where_its_owner_can_be_asked() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path(), "m", &[]);
+        let denied = || not_opened(&store, io::ErrorKind::PermissionDenied.into());
+        let lease = Lease::take(&store, "serve").unwrap();
+        lease.announce(&["unix:/run/a".into()]).unwrap();
+        assert!(matches!(denied(), StoreError::Leased { places, .. } if places == ["unix:/run/a"]));
+        drop(lease);
+        let said = denied().to_string();
+        assert!(said.contains("permission denied"), "{said}");
     }
 
     #[test]

@@ -17,6 +17,7 @@ use nix::pty::openpty;
 use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};
 use nix::unistd::{read, ttyname, write};
+use rustix::termios::ioctl_tiocnxcl;
 
 /// More unsent bytes than this are an overrun.
 const UNSENT_MAX: usize = 16 * 1024;
@@ -164,7 +165,8 @@ impl Pty {
         Ok(())
     }
 
-    /// What the last program has not read when it closes is not for the next one.
+    /// What the last program has not read when it closes is not for the next one, nor does it keep the terminal for
+    /// itself any longer: a program that was killed could not give it back (TIOCEXCL).
     fn look_who_is_there(&mut self) -> io::Result<()> {
         if self.is_attended {
             return Ok(());
@@ -172,6 +174,7 @@ impl Pty {
         if self.clients.have_all_gone() {
             self.unsent.clear();
             tcflush(&self.slave, FlushArg::TCIFLUSH)?;
+            ioctl_tiocnxcl(&self.slave)?;
         }
         Ok(())
     }
@@ -272,8 +275,15 @@ fn replace_link(target: &Path, link: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs::File;
+    use rustix::termios::ioctl_tiocexcl;
+    use std::fs::{File, Permissions};
     use std::io::{BufRead, BufReader, Read};
+    use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+    use std::os::unix::process::CommandExt as _;
+    use std::process::{Command, Stdio};
+
+    /// A user without any right of its own.
+    const NOBODY: u32 = 65_534;
 
     fn client(pty: &Pty) -> File {
         let mut options = File::options();
@@ -331,6 +341,31 @@ mod tests {
             assert!(number > filled || at == number, "{at} follows too early");
         }
         assert!(heard.len() > filled, "only {} lines", heard.len());
+    }
+
+    /// Root opens it in any case, so that somebody else tries.
+    fn another_can_open(pty: &Pty) -> bool {
+        let mut other = Command::new("sh");
+        other.args(["-c", "exec 3<>\"$0\""]).arg(pty.path());
+        other.stderr(Stdio::null());
+        if std::fs::metadata(pty.path()).unwrap().uid() == 0 {
+            let everybody = Permissions::from_mode(0o666);
+            std::fs::set_permissions(pty.path(), everybody).unwrap();
+            other.uid(NOBODY);
+        }
+        other.status().unwrap().success()
+    }
+
+    #[test]
+    fn what_a_program_that_was_killed_had_for_itself_is_free_for_the_next() {
+        let mut pty = Pty::open(None).unwrap();
+        let killed = client(&pty);
+        ioctl_tiocexcl(&killed).unwrap();
+        pty.send(b"heard\r").unwrap();
+        assert!(!another_can_open(&pty), "it has it for itself");
+        drop(killed);
+        pty.send(b"lost\r").unwrap();
+        assert!(another_can_open(&pty), "nobody has it");
     }
 
     fn line(number: usize) -> String {

@@ -1,5 +1,6 @@
 //! A service that keeps an emulated machine in real time, in this process, and how long a command takes to the bus.
 
+use core::cell::Cell;
 use core::time::Duration;
 use std::io::{Read, Write};
 use std::net::SocketAddr;
@@ -18,8 +19,13 @@ use truestage::{Machine, ports};
 use units::Time;
 use wire::{Arrival, Payload, Port, Ports};
 
-/// From one motion to the next at least.
-const MOTION_EVERY: Duration = Duration::from_millis(250);
+use crate::SYNC;
+
+/// From one motion to the next at least, and a part of a SYNC period that is another one each time: a command must
+/// not always come at the same moment of the period.
+const MOTION_EVERY: Duration = Duration::from_millis(100);
+/// The golden section: whatever their number, its multiples are spread evenly over a period.
+const PHASE_STEP: f64 = 0.618_033_988_749_895;
 /// Far more than anything takes here.
 const LATE: Duration = Duration::from_secs(60);
 
@@ -71,6 +77,8 @@ impl Transport for Noting {
 pub(crate) struct Kept {
     pub(crate) service: Service,
     sent: Receiver<Sent>,
+    /// How many motions were commanded.
+    moved: Cell<u32>,
     pub(crate) unix: std::path::PathBuf,
     pub(crate) tcp: SocketAddr,
     _edge: Edge,
@@ -115,6 +123,7 @@ impl Kept {
         Self {
             service,
             sent,
+            moved: Cell::new(0),
             unix,
             tcp,
             _edge: edge,
@@ -161,7 +170,9 @@ impl Kept {
         let (begun, mut taken) = (Instant::now(), Vec::new());
         let mut last = self.sent.try_iter().last();
         while begun.elapsed() < span {
-            let mm = if taken.len() % 2 == 0 { 10.02 } else { 10.0 };
+            let moved = self.moved.get();
+            let mm = if moved % 2 == 0 { 10.02 } else { 10.0 };
+            self.moved.set(moved + 1);
             let body =
                 json!({"targets": {"x": {"value": mm, "unit": "mm"}}, "uncompensated": true});
             last = self.sent.try_iter().last().or(last);
@@ -177,7 +188,8 @@ impl Kept {
                 .find(|it| it.0 > asked && Some(&it.1) != before.as_ref());
             taken.push(first.expect("the drive is told").0 - asked);
             last = frames.last().cloned().or(last);
-            thread::park_timeout((asked + MOTION_EVERY).saturating_duration_since(Instant::now()));
+            let next = asked + MOTION_EVERY + SYNC.mul_f64((f64::from(moved) * PHASE_STEP).fract());
+            thread::park_timeout(next.saturating_duration_since(Instant::now()));
         }
         taken
     }

@@ -36,7 +36,8 @@ fn try_to_move(program: &Path) -> Result<Duration, String> {
     let mut command = Command::new(program);
     command.current_dir(folder.path());
     command.args(["move", "machine.toml", TARGET, "--yes", "--uncompensated"]);
-    command.args(["--record", "bus.log"]);
+    // The emulated drives are waited for as long as a service waits here.
+    command.args(["--record", "bus.log", "--clock-speed", "1.001"]);
     for port in emulated.description().iter().filter_map(|it| endpoint(it)) {
         command.args(["--port", &port]);
     }
