@@ -350,7 +350,11 @@ fn code_of_machine(failure: &machine::Failure) -> Code {
         | Of::Babbling {
             missing: failure, ..
         } => code_of_machine(failure),
-        Of::Alarm { alarm, .. } => code_of_alarm(alarm),
+        Of::Alarm { alarm, .. }
+        | Of::Device {
+            source: DeviceError::Alarmed { alarm, .. },
+            ..
+        } => code_of_alarm(alarm),
         Of::Engine(_)
         | Of::Send { .. }
         | Of::Link { .. }

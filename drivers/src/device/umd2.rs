@@ -14,6 +14,7 @@
 mod health;
 mod sequence;
 mod settings;
+mod start;
 mod weather;
 
 use core::time::Duration;
@@ -31,7 +32,7 @@ use super::average::{Averaging, RunningAverage};
 use super::serial_line::{AssembledLine, LineAssembler};
 use super::{
     Alarm, Device, DeviceError, DeviceName, DisplacementInstrument, DisplacementReading,
-    Environment, Identity, Seen, Signal,
+    Environment, Identity, Signal,
 };
 
 const NAME: DeviceName = DeviceName::Serial("interferometer");
@@ -47,8 +48,12 @@ const JUMPS_MAX: u32 = 3;
 enum State {
     /// Not started.
     Idle,
-    /// Waits for good samples in a row.
-    Starting { since: Time, good: u32 },
+    /// Waits for good samples in a row; `fault` is why the last one was none.
+    Starting {
+        since: Time,
+        good: u32,
+        fault: Option<Alarm>,
+    },
     /// The displacement counts from here (in half wavelengths).
     Tracking { datum: f64 },
     /// The next good sample becomes the datum.
@@ -163,7 +168,7 @@ impl Umd2 {
         match self.state {
             State::Idle | State::Lost => {}
             // While starting, a bad sample just begins the row anew.
-            State::Starting { since, .. } => self.state = State::Starting { since, good: 0 },
+            State::Starting { since, .. } => self.start_again(since, Some(alarm)),
             State::Tracking { .. } | State::WantsDatum => {
                 self.counts.beam_losses += 1;
                 self.state = State::Lost;
@@ -216,8 +221,8 @@ impl Umd2 {
     /// The count survives missing lines.
     fn note_missing(&mut self, missing: u64) {
         self.counts.lost += missing;
-        if let State::Starting { since, .. } = self.state {
-            self.state = State::Starting { since, good: 0 };
+        if let State::Starting { since, fault, .. } = self.state {
+            self.start_again(since, fault);
         }
         self.unusable(missing, 0);
     }
@@ -266,9 +271,10 @@ impl Umd2 {
         let half_wavelengths = sample.half_wavelengths();
         match self.state {
             State::Idle | State::Lost => {}
-            State::Starting { since, good } => {
+            State::Starting { since, good, .. } => {
                 let good = good + 1;
-                self.state = State::Starting { since, good };
+                let fault = None;
+                self.state = State::Starting { since, good, fault };
                 if good >= self.settings.start_samples {
                     self.track_from(half_wavelengths);
                     self.outcome = Some(Ok(()));
@@ -312,19 +318,6 @@ impl Umd2 {
         }
     }
 
-    fn start_ended(&mut self, now: Time, since: Time, good: u32) {
-        let waited = now.since(since);
-        if waited >= self.settings.start_timeout {
-            self.state = State::Idle;
-            self.outcome = Some(Err(DeviceError::Timeout {
-                device: NAME,
-                awaited: "good samples in a row",
-                waited,
-                seen: Seen::Samples(good),
-            }));
-        }
-    }
-
     fn silent(&mut self, now: Time) {
         let waited = now.since(self.heard);
         if !self.is_silent && waited >= self.settings.stream_timeout {
@@ -351,7 +344,7 @@ impl Device for Umd2 {
     fn handle_timeout(&mut self, now: Time) {
         match self.state {
             State::Idle => {}
-            State::Starting { since, good } => self.start_ended(now, since, good),
+            State::Starting { since, good, fault } => self.start_ended(now, since, good, fault),
             State::Tracking { .. } | State::WantsDatum | State::Lost => self.silent(now),
         }
     }
@@ -379,8 +372,7 @@ impl Device for Umd2 {
     }
 
     fn start(&mut self, now: Time) {
-        let (since, good) = (now, 0);
-        self.state = State::Starting { since, good };
+        self.start_again(now, None);
         self.outcome = None;
         self.averaging = Averaging::Never;
         self.newest = None;

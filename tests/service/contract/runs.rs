@@ -11,7 +11,8 @@ use service::{
 use tests::{Edit, LINEAR};
 
 use super::{
-    Bed, SEED, anna, bert, compensated, each, patient, to, with_stage, with_zeroed_stage, zeroed,
+    Bed, SEED, anna, bert, compensated, each, patient, to, with_stage, with_zeroed_stage,
+    with_zeroed_stage_in_process, zeroed,
 };
 use crate::client::PATIENCE;
 use crate::stage::Stage;
@@ -139,6 +140,21 @@ fn a_stop_by_anybody_ends_a_run_at_once_and_names_who() {
             bed.client.zero(&anna(), None);
         });
     }
+}
+
+/// Line 4 of the contract, for what only a run looks at.
+#[test]
+fn a_beam_that_is_lost_fails_the_run_with_its_cause_and_nothing_is_stored() {
+    with_zeroed_stage_in_process(|bed| {
+        let injected = bed.stage.inject(Fault::BeamBlocked);
+        let run = RunRequest::of(RunKind::Calibrate, Some("x"));
+        let id = bed.client.plan(&anna(), &run).unwrap();
+        let view = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!(view.state, RunState::Failed, "{view:?}");
+        assert_eq!(view.cause.expect("it has a cause").code, Code::Beam);
+        assert!(bed.stage.deliveries(injected) > 0, "it was delivered");
+        assert_eq!(bed.client.axis("x").unwrap().calibration, None);
+    });
 }
 
 /// A drive that lets its axis be held fast: what it cannot do is seen by its time only.

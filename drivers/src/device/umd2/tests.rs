@@ -386,6 +386,28 @@ fn a_start_without_a_stream_says_what_it_waited_for() {
     );
 }
 
+/// Whoever stands in the beam is not left to guess.
+#[test]
+fn a_start_in_a_blocked_beam_says_so_and_one_that_was_free_for_a_moment_what_it_waited_for() {
+    for (is_free_at_last, expected) in [(false, "beam lost"), (true, "good samples")] {
+        let mut bench = Bench::new(Umd2Settings::default());
+        bench.device.start(bench.now);
+        bench.next();
+        bench.sample.measurement_count = 0;
+        bench.next();
+        if is_free_at_last {
+            bench.sample.measurement_count = REFERENCE;
+            bench.next();
+        }
+        let due = bench.device.poll_timeout();
+        bench.device.handle_timeout(due);
+        let Some(Err(error)) = bench.device.poll_outcome() else {
+            panic!("no outcome")
+        };
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
 #[test]
 fn the_start_wants_good_samples_in_a_row() {
     let mut bench = Bench::new(Umd2Settings::default());
