@@ -165,12 +165,18 @@ mod tests {
         );
     }
 
-    #[test]
-    fn an_entry_is_a_datagram_with_a_line_for_each_field() {
+    /// A log of the system in a folder, and who tells it.
+    fn journal() -> (tempfile::TempDir, UnixDatagram, SystemLog) {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().join("socket");
         let journal = UnixDatagram::bind(&place).unwrap();
         let log = SystemLog::at(&place).unwrap();
+        (folder, journal, log)
+    }
+
+    #[test]
+    fn an_entry_is_a_datagram_with_a_line_for_each_field() {
+        let (_folder, journal, log) = journal();
         // Whatever a device or a client says: it makes no field of its own.
         log.note(&event(
             "lease",
@@ -197,15 +203,13 @@ mod tests {
     /// A log that takes nothing holds nobody up.
     #[test]
     fn a_log_that_is_gone_is_no_reason_to_fail() {
-        let folder = tempfile::tempdir().unwrap();
-        let place = folder.path().join("socket");
-        let journal = UnixDatagram::bind(&place).unwrap();
-        let log = SystemLog::at(&place).unwrap();
+        let (folder, journal, log) = journal();
         for _ in 0..10_000 {
             log.note(&event("axis", "x", json!({"state": "Standstill"})));
         }
         drop(journal);
         log.note(&event("axis", "x", json!({"state": "Standstill"})));
+        let place = folder.path().join("socket");
         std::fs::remove_file(&place).unwrap();
         assert!(SystemLog::at(&place).is_err());
     }

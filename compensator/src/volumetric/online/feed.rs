@@ -317,10 +317,11 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
         };
         let quick = share / (share + (1.0 - share) * LAG_CONSTANT);
         let repeats = self.settings.repeats.max(1);
+        let passed = noise_passed(share, quick, repeats);
         for (i, value) in value.into_iter().enumerate() {
             self.held[i] = self.held[i] + (value - self.held[i]) * share;
             self.lag[i] = self.lag[i] + (value - self.held[i] - self.lag[i]) * quick;
-            self.noise[i].take(value.value(), (share, quick), repeats);
+            self.noise[i].take(value.value(), share, passed);
         }
     }
 
@@ -347,6 +348,18 @@ impl<Q: Quantity, const N: usize> Feed<Q, N> {
     }
 }
 
+/// How much of the mean square of changes from value to value is in that of a lag, where all is noise: values are smoothed by
+/// the first share, their lag by the second, and each sample is given `repeats` times.
+///
+/// White noise of variance σ² goes through a low pass of pole a, whose output is taken off it, and one of pole b:
+/// (1 − b)²·a²·2σ²/((1 − ab)(1 + a)(1 + b)) is left, the poles being those from sample to sample. A sample that stays for
+/// n values changes them by 2σ²/n in the mean square.
+fn noise_passed(share: f64, quick: f64, repeats: u32) -> f64 {
+    let pole = |share: f64| powi(1.0 - share, i32::try_from(repeats).unwrap_or(i32::MAX));
+    let (a, b) = (pole(share), pole(quick));
+    f64::from(repeats) * (powi((1.0 - b) * a, 2) / ((1.0 - a * b) * (1.0 + a) * (1.0 + b)))
+}
+
 /// What the noise of samples makes of a lag, told by how they change from one to the next: what a machine sees on its
 /// way changes little from sample to sample, and much over the time that smoothing takes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -359,23 +372,15 @@ struct LagNoise {
 }
 
 impl LagNoise {
-    /// Takes a value that was smoothed by the first of `shares`, its lag by the second; each sample is given `repeats`
-    /// times.
-    ///
-    /// White noise of variance σ² goes through a low pass of pole a, whose output is taken off it, and one of pole b:
-    /// (1 − b)²·a²·2σ²/((1 − ab)(1 + a)(1 + b)) is left, the poles being those from sample to sample. A sample that stays for
-    /// n values changes them by 2σ²/n in the mean square.
-    fn take(&mut self, value: f64, (share, quick): (f64, f64), repeats: u32) {
+    /// Takes a value that was smoothed by `share`; so much of its changes is `passed` to the lag.
+    fn take(&mut self, value: f64, share: f64, passed: f64) {
         if share <= 0.0 {
             return;
         }
         let change = self.last.map_or(0.0, |last| value - last);
         self.last = Some(value);
         self.changes += (change * change - self.changes) * share;
-        let pole = |share: f64| powi(1.0 - share, i32::try_from(repeats).unwrap_or(i32::MAX));
-        let (a, b) = (pole(share), pole(quick));
-        let passed = powi((1.0 - b) * a, 2) / ((1.0 - a * b) * (1.0 + a) * (1.0 + b));
-        self.square = self.changes * f64::from(repeats) * passed;
+        self.square = self.changes * passed;
     }
 
     /// How much of a lag is not noise.
