@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 use tests::Rig;
 
-use crate::programs::{live_rigs, truestage};
+use crate::programs::{check_error, live_rigs, truestage};
 
 /// Runs the demonstration of `machine` to its end, which is a good one: as found and as left, by
 /// their places in what it prints, and a page. What is shown without terminals, and how soon, is the
@@ -73,4 +73,14 @@ fn figures(said: Value) -> Value {
         Value::String(_) => Value::Null,
         number => number,
     }
+}
+
+#[test]
+fn a_speed_is_refused_by_what_is_never_shown_in_real_time() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let words = ["demo", "--machine", "volumetric", "--speed", "30"];
+    let refused = truestage(folder.path(), &words).with_code(2);
+    check_error(&refused, &["--speed", "volumetric", "leave it out"]);
+    let left = std::fs::read_dir(folder.path()).expect("it is there");
+    assert_eq!(left.count(), 0, "nothing was begun");
 }

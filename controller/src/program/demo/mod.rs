@@ -37,8 +37,18 @@ pub(crate) struct DemoCommand {
 pub(crate) fn run(command: &DemoCommand, output: Output) -> Ended {
     let (Which(demo), args) = (command.machine, &command.args);
     match demo.show {
+        Show::Alone(_) if args.speed.is_some() => Err(never_in_real_time(demo)),
         Show::Alone(run) => run(demo, args, output),
         Show::OnStand(show) => on_stand(demo, args, output, show),
+    }
+}
+
+/// Nobody shall wait for what is never shown in real time.
+fn never_in_real_time(demo: &Demo) -> Failure {
+    let name = demo.name;
+    Failure::Usage {
+        what: format!("--speed is not for --machine {name}, which is shown as fast as the computer allows"),
+        help: "leave it out, or watch another machine".into(),
     }
 }
 

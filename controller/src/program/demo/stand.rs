@@ -24,7 +24,7 @@ pub(crate) struct DemoArgs {
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     /// Run the emulated machine in real time, this many times as fast (10, say), to watch it;
-    /// without this option time passes as fast as the computer allows.
+    /// without this option time passes as fast as the computer allows. Not for three axes.
     #[arg(long, value_name = "FACTOR")]
     pub(crate) speed: Option<f64>,
     /// Emulate in this process, without terminals: the same frames and figures, sooner. Three axes
