@@ -47,7 +47,9 @@ pub(crate) fn run(command: &DemoCommand, output: Output) -> Ended {
 fn never_in_real_time(demo: &Demo) -> Failure {
     let name = demo.name;
     Failure::Usage {
-        what: format!("--speed is not for --machine {name}, which is shown as fast as the computer allows"),
+        what: format!(
+            "--speed is not for --machine {name}, which is shown as fast as the computer allows"
+        ),
         help: "leave it out, or watch another machine".into(),
     }
 }
