@@ -104,7 +104,7 @@ fn frame(seen: &Seen) -> String {
     let ms = |share| seen.command(share).as_secs_f64() * 1e3;
     format!(
         "command to first frame on the wire, {}: p50 {:.2}, p99 {:.2}, max {:.2} ms of {}; goal: p99 at most {:.1} ms \
-         (one SYNC period and 1 ms): {}",
+         (one SYNC period and 1 ms): {}, {:.1} % within it",
         seen.name,
         ms(0.5),
         ms(0.99),
@@ -112,6 +112,7 @@ fn frame(seen: &Seen) -> String {
         seen.commands.len(),
         limit.as_secs_f64() * 1e3,
         met(seen.command(0.99) <= limit),
+        seen.within(limit) * 100.0,
     )
 }
 

@@ -105,6 +105,12 @@ impl Seen {
         commands.get(at).copied().unwrap_or_default()
     }
 
+    /// The share of commands whose first frame came within `limit`.
+    pub(crate) fn within(&self, limit: Duration) -> f64 {
+        let within = self.commands.iter().filter(|it| **it <= limit).count();
+        within as f64 / self.commands.len().max(1) as f64
+    }
+
     pub(crate) fn json(&self) -> Value {
         let us = |time: Duration| (time.as_secs_f64() * 1e6).round();
         let (least, median, most) = self.against();
