@@ -1,5 +1,7 @@
 //! What is said of an uncertainty budget, whatever it is of: the same figures in text and on the page.
 
+mod input;
+
 use core::fmt::Write as _;
 
 use compensator::budget::COVERAGE_FACTOR;
@@ -148,12 +150,13 @@ impl AtWorst {
             "at two places"
         );
         let each = self.shares.iter().map(|(it, own)| {
+            let (number, unit) = input::told(it.value, &it.unit);
             format!(
                 "\n  {:<38} {:>4} {:>12} {:<9} {:>10} {:>9}  {}",
                 it.name,
                 it.evaluation,
-                of_input(it.value),
-                it.unit,
+                number,
+                unit,
                 share.bare(*own),
                 freedom(it.degrees_of_freedom, 1),
                 correlation(it)
@@ -179,13 +182,14 @@ impl AtWorst {
             share.unit
         );
         for (it, own) in &self.shares {
+            let (number, unit) = input::told(it.value, &it.unit);
             let _ = write!(
                 html,
                 "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
                 escape(&it.name),
                 escape(&it.evaluation.to_string()),
-                of_input(it.value),
-                escape(&it.unit),
+                number,
+                escape(unit),
                 share.bare(*own),
                 freedom(it.degrees_of_freedom, 1),
                 correlation(it)
@@ -228,11 +232,6 @@ pub(crate) fn value_of(
             "contributions": it.contributions,
         })
     })
-}
-
-/// With four digits: more are not known of any uncertainty.
-fn of_input(value: f64) -> String {
-    Short(format!("{value:.3e}").parse().unwrap_or(value)).to_string()
 }
 
 fn freedom(it: Option<f64>, decimals: usize) -> String {

@@ -49,7 +49,7 @@ pub(crate) fn worst(content: &LinearContent) -> Option<AtWorst> {
     let budget = content.axis_budget("").ok().flatten()?;
     let shares = budget.shares(at.position, at.approach)?.into_iter();
     let worst = AtWorst {
-        place: format!("{} mm", Short(at.position.mm())),
+        place: format!("{} mm", to_the_um(at.position)),
         approach: Some(at.approach),
         shares: shares
             .map(|(it, share)| (it.into(), share.value()))
@@ -120,6 +120,11 @@ fn by_size(a: &Combined, b: &Combined) -> Ordering {
     a.value().total_cmp(&b.value())
 }
 
+/// In millimetres: an uncertainty is alike a micrometre further on.
+fn to_the_um(position: Metres) -> Short {
+    Short(position.um().round() / 1e3)
+}
+
 /// How uncertain the corrected position is over the targets of a verification; `None` for one as found.
 pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
     let worst = |it: &UncertaintyAtTarget| {
@@ -132,7 +137,7 @@ pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
         .collect();
     known.sort_by(|a, b| by_size(&a.1, &b.1));
     let at = |(target, it): &(Metres, Combined)| {
-        format!("{:.3} µm at {} mm", it.expanded().um(), Short(target.mm()))
+        format!("{:.3} µm at {} mm", it.expanded().um(), to_the_um(*target))
     };
     if targets.is_empty() {
         return None;
@@ -149,7 +154,7 @@ pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
         at(most)
     );
     let beyond = targets.iter().filter(|it| worst(it).is_none());
-    let beyond: Vec<String> = beyond.map(|it| Short(it.target.mm()).to_string()).collect();
+    let beyond: Vec<String> = beyond.map(|it| to_the_um(it.target).to_string()).collect();
     if !beyond.is_empty() {
         text += &format!(
             "; NOT STATED at {} mm, beyond the calibrated range",
