@@ -162,7 +162,9 @@ fn refused(it: &Mistyped) -> Result<Vec<Diagnostic>, String> {
 fn complaint(it: &Mistyped, found: &[Diagnostic]) -> Option<String> {
     let is_whole =
         |one: &Diagnostic| !(one.key.is_empty() || one.cause.is_empty() || one.help.is_empty());
-    let told = |one: &Diagnostic| one.line == it.line && is_whole(one);
+    // A key that is mistyped as the name of a section is told where that begins, with the line of both.
+    let tells_line = |one: &Diagnostic| one.cause.ends_with(&format!(" on line {}", it.line));
+    let told = |one: &Diagnostic| (one.line == it.line || tells_line(one)) && is_whole(one);
     if !found.iter().any(told) {
         return Some(format!(
             "nothing whole is told of line {}: {found:#?}",

@@ -17,7 +17,8 @@ pub(super) fn explained(text: &str, span: &Range<usize>, message: &str) -> Findi
         help: "a line is `key = value`, `[section]`, or a comment after #".into(),
     };
     if message.starts_with(TWICE) {
-        return place.twice(text).unwrap_or_else(other);
+        let told = place.twice(text).or_else(|| place.key_and_section(text));
+        return told.unwrap_or_else(other);
     }
     place
         .with_a_unit()
@@ -137,6 +138,30 @@ impl<'a> Place<'a> {
             help: "leave one of them out".into(),
         })
     }
+
+    /// Where a key has the name that a section has here, or the other way round.
+    fn key_and_section(&self, text: &str) -> Option<Finding> {
+        let here = self.key();
+        let mut section = "";
+        let mut before = text.lines().map(str::trim).take(self.number);
+        let first = before.position(|line| {
+            if is_header(line) {
+                section = name_of(line);
+                return !is_header(self.line) && section == here;
+            }
+            let key = line.split_once('=').map(|it| it.0.trim());
+            is_header(self.line) && key.is_some_and(|it| here == format!("{section}.{it}"))
+        })?;
+        let [what, other] = match is_header(self.line) {
+            true => ["section", "key"],
+            false => ["key", "section"],
+        };
+        Some(Finding {
+            key: here,
+            cause: format!("it is a {what} here, and a {other} on line {}", first + 1),
+            help: format!("one of them has the wrong name: correct the {other} or the {what}"),
+        })
+    }
 }
 
 /// `[axis.x]`, and no line of a list over several lines.
@@ -212,6 +237,18 @@ mod tests {
             "axis.x.calibrate",
             says,
         );
+    }
+
+    #[test]
+    fn a_key_that_is_called_like_a_section_is_named_with_both_places() {
+        let header = LINEAR.lines().position(|it| it == "[axis.x]");
+        let header = header.expect("it is there") + 1;
+        let says = format!("a section here, and a key on line {}", header + 1);
+        let to = "[axis.x]\nzero = 400.0\n";
+        check("[axis.x]\n", to, "axis.x.zero", [&says, "wrong name"]);
+        let says = format!("a key here, and a section on line {header}");
+        let to = "[axis.x.soft]\n[axis.x]\nsoft = 3\n";
+        check("[axis.x]\n", to, "axis.x.soft", [&says, "wrong name"]);
     }
 
     #[test]
