@@ -29,6 +29,7 @@ mod syntax;
 mod unit;
 pub(crate) mod validate;
 pub(crate) mod warnings;
+mod watch_warnings;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;

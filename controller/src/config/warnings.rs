@@ -2,6 +2,7 @@
 
 use super::judge::{Finding, Judge};
 use super::model::MachineConfig;
+use super::watch_warnings;
 use crate::hardware::node::IdentityConfig;
 use crate::kinds::KINDS;
 
@@ -9,6 +10,7 @@ use crate::kinds::KINDS;
 pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
     let mut found = Vec::new();
     check_profiles(config, &mut found);
+    watch_warnings::check(config, &mut found);
     for kind in KINDS {
         (kind.warnings)(config, &mut found);
     }

@@ -1,0 +1,226 @@
+//! What is doubtful of how drives are watched: each by itself is sound, and by all of them nothing would be noticed.
+
+use core::time::Duration;
+
+use units::{Short, ShortSpan};
+
+use super::AxisConfig;
+use super::DriveConfig;
+use super::judge::{Finding, Judge};
+use super::least_time::least_time;
+use super::model::MachineConfig;
+use crate::rotary::RotaryConfig;
+
+/// Nobody waits so long beside a move that hangs.
+const HANGS_MAX_S: f64 = 600.0;
+/// A move over the whole travel may take so much longer than it must, whatever settles.
+const HANGS_MOVES: f64 = 20.0;
+/// A shorter time within the window is somebody's wish, however short the moves are.
+const STANDS_MAX_S: f64 = 1.0;
+
+/// What is judged of any drive: in millimetres or degrees.
+struct Watched {
+    /// The longest way, in words.
+    way: String,
+    /// How long that takes at least, in seconds.
+    least_s: f64,
+    unit: &'static str,
+    acceleration: f64,
+    /// The key of how a quick stop slows down, and its value.
+    quick_stop: (&'static str, f64),
+    following_error_timeout_ms: Option<u16>,
+    position_window_time_ms: u16,
+    move_timeout_s: f64,
+}
+
+impl Watched {
+    fn axis(axis: &AxisConfig) -> Self {
+        let motion = &axis.motion;
+        let travel = motion.soft_max_mm - motion.soft_min_mm;
+        let acceleration = motion.acceleration_mm_per_s2;
+        Self {
+            way: format!("the whole travel of {} mm", Short(travel)),
+            least_s: least_time(travel, motion.speed_mm_per_s, acceleration),
+            unit: "mm/s²",
+            acceleration,
+            quick_stop: (
+                "quick_stop_deceleration_mm_per_s2",
+                motion.quick_stop_deceleration_mm_per_s2,
+            ),
+            following_error_timeout_ms: match &axis.drive {
+                DriveConfig::Cia402(it) => Some(it.following_error_timeout_ms),
+                DriveConfig::Copley(_) => None,
+            },
+            position_window_time_ms: motion.position_window_time_ms,
+            move_timeout_s: motion.move_timeout_s,
+        }
+    }
+
+    fn table(table: &RotaryConfig) -> Self {
+        let acceleration = table.acceleration_deg_per_s2;
+        Self {
+            way: "a whole turn".into(),
+            least_s: least_time(360.0, table.speed_deg_per_s, acceleration),
+            unit: "°/s²",
+            acceleration,
+            quick_stop: (
+                "quick_stop_deceleration_deg_per_s2",
+                table.quick_stop_deceleration_deg_per_s2,
+            ),
+            following_error_timeout_ms: Some(table.following_error_timeout_ms),
+            position_window_time_ms: table.position_window_time_ms,
+            move_timeout_s: table.move_timeout_s,
+        }
+    }
+
+    fn judge(&self, judge: &mut Judge<'_>) {
+        self.quick_stop(judge);
+        self.following_error(judge);
+        self.standing(judge);
+        self.hanging(judge);
+    }
+
+    fn quick_stop(&self, judge: &mut Judge<'_>) {
+        let (key, deceleration) = self.quick_stop;
+        if deceleration >= self.acceleration {
+            return;
+        }
+        let cause = format!(
+            "a quick stop slows down by {} {}, and an ordinary move by {}",
+            Short(deceleration),
+            self.unit,
+            Short(self.acceleration)
+        );
+        judge.say(
+            key,
+            cause,
+            "give at least what a move ends with: a quick stop must not take longer",
+        );
+    }
+
+    fn following_error(&self, judge: &mut Judge<'_>) {
+        let Some(timeout) = self.following_error_timeout_ms else {
+            return;
+        };
+        let timeout_s = f64::from(timeout) * 1e-3;
+        if timeout_s > self.least_s {
+            let cause = format!(
+                "the following error may be too large for {} before the drive says so, and {} takes {}: no move lasts so long",
+                span(timeout_s),
+                self.way,
+                span(self.least_s)
+            );
+            judge.say(
+                "following_error_timeout_ms",
+                cause,
+                "give what a servo needs to settle, 20 to 100 ms",
+            );
+        }
+    }
+
+    fn standing(&self, judge: &mut Judge<'_>) {
+        let stands_s = f64::from(self.position_window_time_ms) * 1e-3;
+        if stands_s > self.least_s.max(STANDS_MAX_S) {
+            let cause = format!(
+                "each move stands within its window for {} before it is there, and {} takes {}",
+                span(stands_s),
+                self.way,
+                span(self.least_s)
+            );
+            judge.say(
+                "position_window_time_ms",
+                cause,
+                "give some periods of the servo, 10 to 100 ms",
+            );
+        }
+    }
+
+    fn hanging(&self, judge: &mut Judge<'_>) {
+        let limit_s = self.move_timeout_s;
+        if limit_s > HANGS_MAX_S.max(HANGS_MOVES * self.least_s) {
+            let cause = format!(
+                "a move that hangs is noticed after {}, and {} takes {}",
+                span(limit_s),
+                self.way,
+                span(self.least_s)
+            );
+            judge.say(
+                "move_timeout_s",
+                cause,
+                "give some times what the longest move takes",
+            );
+        }
+    }
+}
+
+fn span(seconds: f64) -> ShortSpan {
+    ShortSpan(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
+}
+
+pub(super) fn check(config: &MachineConfig, found: &mut Vec<Finding>) {
+    for (name, axis) in &config.axis {
+        Watched::axis(axis).judge(&mut Judge::at(format!("axis.{name}"), found));
+    }
+    for (name, table) in &config.rotary {
+        Watched::table(table).judge(&mut Judge::at(format!("rotary.{name}"), found));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::warnings::told::check;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
+    const VOLUMETRIC: &str = include_str!("../../../configs/machines/volumetric.toml");
+
+    #[test]
+    fn milliseconds_that_were_taken_for_something_else_are_told() {
+        let edit = (
+            "following_error_timeout_ms = 50",
+            "following_error_timeout_ms = 50000",
+        );
+        let says = "for 50s before the drive says so, and the whole travel of 66 mm takes 370ms";
+        check(
+            LINEAR,
+            &[edit],
+            &["axis.x.following_error_timeout_ms"],
+            says,
+        );
+        let says = "and a whole turn takes 12.17s: no move lasts so long";
+        check(
+            ROTARY,
+            &[edit],
+            &["rotary.c.following_error_timeout_ms"],
+            says,
+        );
+        let edit = (
+            "position_window_time_ms = 10",
+            "position_window_time_ms = 10000",
+        );
+        let says = "for 10s before it is there";
+        check(LINEAR, &[edit], &["axis.x.position_window_time_ms"], says);
+    }
+
+    #[test]
+    fn a_move_that_hangs_for_hours_is_told() {
+        let edit = ("move_timeout_s = 30.0", "move_timeout_s = 30000.0");
+        let says = "the whole travel of 506 mm takes 5.16s";
+        check(VOLUMETRIC, &[edit], &["axis.x.move_timeout_s"], says);
+    }
+
+    #[test]
+    fn a_quick_stop_that_is_slower_than_a_move_is_told() {
+        let slow = (
+            "quick_stop_deceleration_deg_per_s2 = 720.0",
+            "quick_stop_deceleration_deg_per_s2 = 72.0",
+        );
+        let says = "slows down by 72 °/s², and an ordinary move by 180";
+        check(
+            ROTARY,
+            &[slow],
+            &["rotary.c.quick_stop_deceleration_deg_per_s2"],
+            says,
+        );
+    }
+}
