@@ -4,8 +4,9 @@
 //! about the model, which is the screw's own error at a stroke with what is left of the rest in the mean of a
 //! stroke; and how the sides and repetitions of one stroke differ, which is what the camera sees wrongly and a
 //! stop does not repeat. Both were widened for their degrees of freedom where these are few, which is in the
-//! sensitivities here: the expanded uncertainty is twice the combined one as it is. A single stop scatters about
-//! the model besides.
+//! sensitivities here: the expanded uncertainty is twice the combined one as it is. A third part, where it is known,
+//! is where the strokes are seen from: no stroke shows that error, which all of them have. A single stop scatters
+//! about the model besides (see `stop`), widened likewise.
 //!
 //! Absent, because the strokes say nothing of it: the scale of the camera, what play leaves open while nobody
 //! knows which flank the nut leans on.
@@ -71,6 +72,8 @@ impl ScatterParts {
 pub(super) const STROKES: &str = "strokes about the model";
 /// How sides and repetitions of a stroke differ.
 pub(super) const SIDES: &str = "sides and repetitions of a stroke";
+/// Where all of them are counted from.
+pub(super) const ORIGIN: &str = "the zero as it was seen";
 /// What a single stop does besides.
 const ONE_STOP: &str = "one stop";
 

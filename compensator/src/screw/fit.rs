@@ -16,7 +16,7 @@
 
 use units::Metres;
 
-use super::budget::{SIDES, STROKES, ScatterPart, ScatterParts};
+use super::budget::{ORIGIN, SIDES, STROKES, ScatterPart, ScatterParts};
 use super::error::FitError;
 use super::observe::observable;
 use super::options::FitOptions;
@@ -149,14 +149,18 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
     let strata = problem.strata(&kept)?;
     let variances = strata.variances();
     let solved = problem.solve(&kept, &variances)?;
-    let covariance = strata
-        .widened()
-        .map(|real| problem.covariance(&kept, (&variances, &real), &solved.cofactor));
-    let parts = parts_of(&problem, &kept, &strata, &solved.cofactor);
+    let origin = square(options.origin);
+    let covariance = strata.widened().map(|real| {
+        let mut own = problem.covariance(&kept, (&variances, &real), &solved.cofactor);
+        // All rows are off by it, as an offset is.
+        own[0] += origin;
+        own
+    });
+    let parts = parts_of(&problem, &kept, &strata, (&solved.cofactor, options));
     let root = |variance: f64| Metres(variance.sqrt());
-    let residual = root(variances.of_one());
-    let reading = options.reading.map_or(0.0, Metres::value);
-    let of_move = root(variances.of_move(reading * reading));
+    let single = strata.single();
+    let no_stop = square(options.reading) + strata.followed();
+    let of_stop = root(single.of_stop(no_stop));
     let repeatability = root(variances.repeat);
     let lack_of_fit = strata.lack_of_fit(FLOOR).map(|p_value| LackOfFit {
         p_value,
@@ -170,11 +174,11 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
             &kept,
             &solved.coefficients,
             covariance,
-            of_move,
+            of_stop,
         ),
         parts,
         outliers: Vec::new(),
-        residual,
+        residual: root(single.variance()),
         scatter: Scatter {
             stroke: root(variances.stroke.max(0.0)),
             side: root(variances.side.max(0.0)),
@@ -243,7 +247,7 @@ fn parts_of(
     problem: &Problem,
     kept: &[u32],
     strata: &Strata,
-    cofactor: &[f64],
+    (cofactor, options): (&[f64], &FitOptions),
 ) -> Option<ScatterParts> {
     let (variances, real) = (strata.variances(), strata.widened()?);
     let [strokes, sides] = problem.covariance_in_parts(kept, (&variances, &real), cofactor);
@@ -254,18 +258,26 @@ fn parts_of(
         covariance,
     };
     let (between, within) = (strata.strokes.freedom, strata.freedom_of_sides());
+    let mut of_model = vec![
+        part(STROKES, strata.scatter_of_strokes(), between, strokes),
+        part(SIDES, strata.scatter_of_sides(), within, sides),
+    ];
+    of_model.extend(options.origin.map(|origin| {
+        let mut of_offset = vec![0.0; cofactor.len()];
+        of_offset[0] = origin.value() * origin.value();
+        // By what the pictures of each row scatter, one degree of freedom or more of each.
+        part(ORIGIN, origin.value(), problem.rows(), of_offset)
+    }));
+    let no_stop = square(options.reading) + strata.followed();
     Some(ScatterParts {
-        of_model: vec![
-            part(STROKES, strata.scatter_of_strokes(), between, strokes),
-            part(SIDES, strata.scatter_of_sides(), within, sides),
-        ],
-        // What is largest of it is known that well.
-        freedom_of_stop: if variances.stroke > 0.0 {
-            between
-        } else {
-            within
-        },
+        of_model,
+        freedom_of_stop: strata.single().freedom_of_stop(no_stop),
     })
+}
+
+/// Of a length that may not be known.
+fn square(length: Option<Metres>) -> f64 {
+    length.map_or(0.0, |it| it.value() * it.value())
 }
 
 fn leaks(

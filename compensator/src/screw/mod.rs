@@ -39,6 +39,7 @@ mod engagement;
 mod error;
 mod fit;
 mod limits;
+mod neighbours;
 mod observe;
 mod options;
 mod outliers;
@@ -46,6 +47,7 @@ pub mod patent;
 pub mod plan;
 mod problem;
 mod series;
+mod stop;
 mod strata;
 
 use core::f64::consts::TAU;
@@ -125,8 +127,9 @@ pub struct ScrewModel {
     /// order, square row by row, SI units; widened for their degrees of freedom where these are few.
     /// `None` where nothing was left to judge by.
     pub covariance: Option<Vec<f64>>,
-    /// Standard deviation of a single move around the model, the screw's own errors at a stroke included, and what its
-    /// instrument does not repeat where that is not known by itself; `None` when nothing was repeated.
+    /// Standard uncertainty of a single move around the model, the screw's own errors at a stroke included, and what its
+    /// instrument does not repeat where that is not known by itself; of least squares widened like the covariance.
+    /// `None` when nothing was repeated.
     pub scatter: Option<Metres>,
 }
 

@@ -18,6 +18,9 @@ pub struct FitOptions {
     /// Standard uncertainty of one row by what its instrument does not repeat, where that is known: it makes rows
     /// scatter, but not where a move ends.
     pub reading: Option<Metres>,
+    /// The same of where all rows count from. It is the same error in each row, so that no row shows it, and
+    /// comes back in every move.
+    pub origin: Option<Metres>,
 }
 
 impl Default for FitOptions {
@@ -30,6 +33,7 @@ impl Default for FitOptions {
             outlier_threshold: 6.0,
             outlier_share_max: 0.2,
             reading: None,
+            origin: None,
         }
     }
 }

@@ -60,6 +60,11 @@ impl Problem {
         Err(FitError::TooFewRows { rows, parameters })
     }
 
+    /// Strokes, repetitions counted.
+    pub(super) const fn rows(&self) -> usize {
+        self.cells.rows
+    }
+
     /// Different strokes.
     pub(super) fn places(&self) -> usize {
         self.cells.places.len()

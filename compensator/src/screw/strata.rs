@@ -25,9 +25,11 @@
 //! holds in nine cases of ten at the worst.
 //!
 //! Absent: errors of neighbouring strokes that resemble each other (they make a slope that is the screw's own
-//! over the strokes measured, and count as such).
+//! over the strokes measured, and count as such); a single stop is judged with them (see `neighbours`).
 
 use super::cells::{Cells, Place};
+use super::neighbours::Neighbours;
+use super::stop::Single;
 use crate::least_squares::{self, LeastSquaresError};
 use crate::significance::{f_tail, student_limit};
 use crate::uncertainty::propagate;
@@ -54,7 +56,12 @@ pub(super) struct Stratum {
 }
 
 impl Stratum {
-    fn mean(&self) -> f64 {
+    const NONE: Self = Self {
+        squares: 0.0,
+        freedom: 0,
+    };
+
+    pub(super) fn mean(&self) -> f64 {
         self.squares / self.freedom.max(1) as f64
     }
 
@@ -67,12 +74,17 @@ impl Stratum {
 
     /// As if its freedom had no end.
     fn widened(self) -> Self {
-        let factor = student_limit(BEYOND_TWICE, self.freedom.max(1)) / 2.0;
         Self {
-            squares: self.squares * factor * factor,
+            squares: self.squares * widening(self.freedom),
             freedom: self.freedom,
         }
     }
+}
+
+/// By how much a variance of so many degrees of freedom is widened, as if they had no end.
+pub(super) fn widening(freedom: usize) -> f64 {
+    let factor = student_limit(BEYOND_TWICE, freedom.max(1)) / 2.0;
+    factor * factor
 }
 
 /// Variances of the effects, m².
@@ -88,18 +100,6 @@ pub(super) struct Variances {
 }
 
 impl Variances {
-    /// Of a single stroke about the model.
-    pub(super) fn of_one(&self) -> f64 {
-        self.stroke.max(0.0) + self.side.max(0.0) + self.repeat
-    }
-
-    /// Of where a single stroke ends about the model; `reading` is the variance of what the instrument does not repeat,
-    /// which repetitions show as well.
-    pub(super) fn of_move(&self, reading: f64) -> f64 {
-        let repeat = (self.repeat - reading).max(0.0);
-        Self { repeat, ..*self }.of_one()
-    }
-
     /// Of the mean of so many repetitions, the error of the stroke apart.
     pub(super) fn of_cell(&self, count: f64) -> f64 {
         self.side + self.repeat / count
@@ -121,6 +121,7 @@ pub(super) struct Strata {
     stroke_in_strokes: f64,
     /// The repetitions of each stroke, by side.
     counts: Vec<Vec<f64>>,
+    neighbours: Neighbours,
 }
 
 /// Whether what the sides differ by is better judged by itself.
@@ -170,6 +171,7 @@ impl Strata {
             side_in_strokes: (model.grows_with_side - sides.grows).max(0.0),
             stroke_in_strokes: model.grows_with_stroke,
             counts: cells.places.iter().map(Place::counts).collect(),
+            neighbours: model.neighbours,
         })
     }
 
@@ -187,6 +189,38 @@ impl Strata {
         let repeat = self.within.widened().mean();
         let side = self.side(repeat, self.sides.map(Stratum::widened));
         Some(self.with_stroke(self.strokes.widened(), repeat, side))
+    }
+
+    /// What a single row scatters about the model: the sum of the variances, each as it is expected from these squares,
+    /// even below zero.
+    pub(super) fn single(&self) -> Single {
+        if self.within == self.strokes {
+            return Single::default().with(1.0, self.strokes);
+        }
+        let of = |squares: Stratum, grows: f64| match squares.freedom {
+            0 => 0.0,
+            freedom => freedom as f64 / grows,
+        };
+        let sides = self.sides.unwrap_or(Stratum::NONE);
+        let of_strokes = of(self.strokes, self.stroke_in_strokes);
+        let without_stroke = match self.strokes.freedom {
+            0 => 1.0,
+            _ => 1.0 - self.side_in_strokes / self.stroke_in_strokes,
+        };
+        let of_sides = without_stroke * of(sides, self.side_in_sides);
+        Single::default()
+            .with(of_strokes, self.strokes)
+            .with(of_sides, sides)
+            .with(1.0 - of_strokes - of_sides, self.within)
+    }
+
+    /// By how much less a stop between strokes scatters than [`Self::single`], m²: neighbouring strokes share errors.
+    pub(super) fn followed(&self) -> f64 {
+        if self.strokes.freedom == 0 {
+            return 0.0;
+        }
+        let own = self.variances().stroke.max(0.0);
+        self.neighbours.followed(self.strokes.mean(), own)
     }
 
     /// Degrees of freedom of what a difference at the same stroke is judged by.
@@ -287,6 +321,7 @@ struct Model {
     squares: f64,
     grows_with_side: f64,
     grows_with_stroke: f64,
+    neighbours: Neighbours,
 }
 
 impl Model {
@@ -320,6 +355,7 @@ impl Model {
             squares: fit.squares(),
             grows_with_side,
             grows_with_stroke,
+            neighbours: Neighbours::of(cells, (lead, harmonics), &fit),
         })
     }
 }

@@ -19,6 +19,7 @@ use crate::platform::config::ScrewMethodName as Method;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::look::Seen;
+use crate::platform::zero::DATUM_LOOKS;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
@@ -58,6 +59,12 @@ impl MeasuredScrew {
         let known = !self.strokes.is_empty() && self.variances.len() == self.strokes.len();
         let mean = || self.variances.iter().sum::<f64>() / self.variances.len() as f64;
         known.then(|| Metres(mean().sqrt()))
+    }
+
+    /// The same of the zero, which is looked at more often.
+    fn origin(&self) -> Option<Metres> {
+        let looks = f64::from(DATUM_LOOKS);
+        self.reading().map(|it| it / looks.sqrt())
     }
 }
 
@@ -275,6 +282,7 @@ impl AlignmentPlatform<'_> {
                     harmonics_max: plan.harmonics_max,
                     significance: plan.significance,
                     reading: measured.reading(),
+                    origin: measured.origin(),
                     ..FitOptions::default()
                 };
                 let fitted = screw::fit(strokes, &options);

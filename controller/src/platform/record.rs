@@ -53,7 +53,7 @@ pub struct ScrewContent {
     /// Covariance of offset, slope, lost motion, and sine and cosine of each harmonic, square
     /// row by row, in metres and metres per metre; where anything was repeated.
     pub covariance_si: Option<Vec<f64>>,
-    /// Standard deviation of a single move about the model; where anything was repeated.
+    /// Standard uncertainty of a single move about the model; where anything was repeated.
     pub scatter_m: Option<f64>,
     /// Strokes that were left out because they do not fit the others.
     #[serde(default)]
