@@ -66,8 +66,8 @@ fn after_an_interruption_play_that_nobody_knows_is_taken_up_first_and_told() {
     let moved = machine.platform().unwrap().move_to(target).unwrap();
     let axes: Vec<&str> = moved.taken_up.iter().map(|it| it.axis.as_str()).collect();
     assert_eq!(axes, ["u", "v", "w"]);
-    let after = moved.standard_uncertainty().expect("it is calibrated");
-    for it in &moved.taken_up {
+    for (it, after) in moved.taken_up.iter().zip(&moved.uncertainties) {
+        let after = after.expect("it is calibrated");
         // What a single move does not repeat is in both; half the play over √3 only in the first: plays are 1.6 to 2.6 µm.
         let before = it.standard_uncertainty.expect("it is calibrated");
         let doubt_um = (before.um().powi(2) - after.um().powi(2)).sqrt();
