@@ -49,6 +49,7 @@ mod problem;
 mod series;
 mod stop;
 mod strata;
+mod stratum;
 
 use core::f64::consts::TAU;
 

@@ -11,7 +11,7 @@
 //! it is taken off, of the sum. So is what the model has followed of the errors that neighbouring strokes share (see
 //! `neighbours`).
 
-use super::strata::{Stratum, widening};
+use super::stratum::{Stratum, widening};
 
 /// The variance of a single row about the model, m², by the mean squares that it is a mixture of.
 #[derive(Clone, Debug, Default)]

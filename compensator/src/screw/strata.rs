@@ -30,12 +30,10 @@
 use super::cells::{Cells, Place};
 use super::neighbours::Neighbours;
 use super::stop::Single;
+use super::stratum::Stratum;
 use crate::least_squares::{self, LeastSquaresError};
-use crate::significance::{f_tail, student_limit};
+use crate::significance::f_tail;
 use crate::uncertainty::propagate;
-
-/// A normal distribution exceeds twice its standard deviation with this probability.
-const BEYOND_TWICE: f64 = 0.0455;
 
 /// Fewer sides' differences are an effect of their own only where repetitions would differ so much as seldom as
 /// `SIDES_LEVEL` says.
@@ -46,46 +44,6 @@ const SIDES_LEVEL: f64 = 0.25;
 
 /// The strokes' mean square is at least this share of what their repetitions alone make of it.
 const SHARE_MIN: f64 = 0.05;
-
-/// Squares and their degrees of freedom.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stratum {
-    /// m².
-    squares: f64,
-    pub(super) freedom: usize,
-}
-
-impl Stratum {
-    const NONE: Self = Self {
-        squares: 0.0,
-        freedom: 0,
-    };
-
-    pub(super) fn mean(&self) -> f64 {
-        self.squares / self.freedom.max(1) as f64
-    }
-
-    fn with(self, other: Self) -> Self {
-        Self {
-            squares: self.squares + other.squares,
-            freedom: self.freedom + other.freedom,
-        }
-    }
-
-    /// As if its freedom had no end.
-    fn widened(self) -> Self {
-        Self {
-            squares: self.squares * widening(self.freedom),
-            freedom: self.freedom,
-        }
-    }
-}
-
-/// By how much a variance of so many degrees of freedom is widened, as if they had no end.
-pub(super) fn widening(freedom: usize) -> f64 {
-    let factor = student_limit(BEYOND_TWICE, freedom.max(1)) / 2.0;
-    factor * factor
-}
 
 /// Variances of the effects, m².
 #[derive(Clone, Copy, Debug, PartialEq)]
