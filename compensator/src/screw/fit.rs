@@ -156,11 +156,15 @@ fn fit_all(strokes: &[Stroke], options: &FitOptions) -> Result<Fitted, FitError>
         own[0] += origin;
         own
     });
-    let parts = parts_of(&problem, &kept, &strata, (&solved.cofactor, options));
     let root = |variance: f64| Metres(variance.sqrt());
     let single = strata.single();
     let no_stop = square(options.reading) + strata.followed();
     let of_stop = root(single.of_stop(no_stop));
+    let of_model = parts_of(&problem, &kept, &strata, (&solved.cofactor, options.origin));
+    let parts = of_model.map(|of_model| ScatterParts {
+        of_model,
+        freedom_of_stop: single.freedom_of_stop(no_stop),
+    });
     let repeatability = root(variances.repeat);
     let lack_of_fit = strata.lack_of_fit(FLOOR).map(|p_value| LackOfFit {
         p_value,
@@ -247,8 +251,8 @@ fn parts_of(
     problem: &Problem,
     kept: &[u32],
     strata: &Strata,
-    (cofactor, options): (&[f64], &FitOptions),
-) -> Option<ScatterParts> {
+    (cofactor, origin): (&[f64], Option<Metres>),
+) -> Option<Vec<ScatterPart>> {
     let (variances, real) = (strata.variances(), strata.widened()?);
     let [strokes, sides] = problem.covariance_in_parts(kept, (&variances, &real), cofactor);
     let part = |name, scatter: f64, degrees_of_freedom, covariance| ScatterPart {
@@ -262,17 +266,13 @@ fn parts_of(
         part(STROKES, strata.scatter_of_strokes(), between, strokes),
         part(SIDES, strata.scatter_of_sides(), within, sides),
     ];
-    of_model.extend(options.origin.map(|origin| {
+    of_model.extend(origin.map(|origin| {
         let mut of_offset = vec![0.0; cofactor.len()];
         of_offset[0] = origin.value() * origin.value();
         // By what the pictures of each row scatter, one degree of freedom or more of each.
         part(ORIGIN, origin.value(), problem.rows(), of_offset)
     }));
-    let no_stop = square(options.reading) + strata.followed();
-    Some(ScatterParts {
-        of_model,
-        freedom_of_stop: strata.single().freedom_of_stop(no_stop),
-    })
+    Some(of_model)
 }
 
 /// Of a length that may not be known.

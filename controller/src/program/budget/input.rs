@@ -2,13 +2,15 @@
 
 use units::Short;
 
+use super::ARCSECONDS;
+
 /// Of a unit of a record: what is shown instead, the smallest first, each with what one of it is in that unit.
 type Shown = [(f64, &'static str)];
 
 const LENGTHS: &Shown = &[(1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")];
 const SHARES_OF_A_LENGTH: &Shown = &[(1e-9, "nm/m"), (1e-6, "µm/m"), (1e-3, "mm/m")];
 const EXPANSIONS: &Shown = &[(1e-9, "nm/(m·K)"), (1e-6, "µm/(m·K)")];
-const ANGLES: &Shown = &[(core::f64::consts::PI / (180.0 * 3600.0), "″")];
+const ANGLES: &Shown = &[(1.0 / ARCSECONDS, "″")];
 const SHARES_OF_A_GAS: &Shown = &[(1.0, "µmol/mol")];
 
 fn shown_for(unit: &str) -> &'static Shown {
