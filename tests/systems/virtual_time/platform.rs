@@ -13,7 +13,7 @@ use units::{Approach, Metres, Time};
 /// How many poses are visited as found, and as left.
 const FOUND: u32 = 40;
 fn how_many_left() -> u32 {
-    in_every_run(150, 500)
+    in_every_run(75, 500)
 }
 
 /// A platform under one method of estimating and one rule of compensating.
