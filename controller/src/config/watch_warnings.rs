@@ -24,6 +24,8 @@ struct Watched {
     way: String,
     /// How long that takes at least, in seconds.
     least_s: f64,
+    /// At this speed, with its unit.
+    speed: String,
     unit: &'static str,
     acceleration: f64,
     /// The key of how a quick stop slows down, and its value.
@@ -41,6 +43,7 @@ impl Watched {
         Self {
             way: format!("the whole travel of {} mm", Short(travel)),
             least_s: least_time(travel, motion.speed_mm_per_s, acceleration),
+            speed: format!("{} mm/s", Short(motion.speed_mm_per_s)),
             unit: "mm/s²",
             acceleration,
             quick_stop: (
@@ -61,6 +64,7 @@ impl Watched {
         Self {
             way: "a whole turn".into(),
             least_s: least_time(360.0, table.speed_deg_per_s, acceleration),
+            speed: format!("{}°/s", Short(table.speed_deg_per_s)),
             unit: "°/s²",
             acceleration,
             quick_stop: (
@@ -77,6 +81,7 @@ impl Watched {
         self.quick_stop(judge);
         self.following_error(judge);
         self.standing(judge);
+        self.hurried(judge);
         self.hanging(judge);
     }
 
@@ -131,6 +136,20 @@ impl Watched {
                 "position_window_time_ms",
                 cause,
                 "give some periods of the servo, 10 to 100 ms",
+            );
+        }
+    }
+
+    fn hurried(&self, judge: &mut Judge<'_>) {
+        if self.least_s > self.move_timeout_s {
+            let (least, speed) = (span(self.least_s), &self.speed);
+            judge.say(
+                "move_timeout_s",
+                format!("{} takes {least} at {speed}", self.way),
+                format!(
+                    "give more than {:.1}, and time to settle",
+                    (10.0 * self.least_s).ceil() / 10.0
+                ),
             );
         }
     }
@@ -200,6 +219,16 @@ mod tests {
         );
         let says = "for 10s before it is there";
         check(LINEAR, &[edit], &["axis.x.position_window_time_ms"], says);
+    }
+
+    #[test]
+    fn a_time_that_no_long_move_can_keep_is_told() {
+        let says = "the whole travel of 66 mm takes 370ms at 200 mm/s";
+        let edit = ("move_timeout_s = 10.0", "move_timeout_s = 0.3");
+        check(LINEAR, &[edit], &["axis.x.move_timeout_s"], says);
+        let edit = ("move_timeout_s = 60.0", "move_timeout_s = 12.0");
+        let says = "a whole turn takes 12.17s at 30°/s";
+        check(ROTARY, &[edit], &["rotary.c.move_timeout_s"], says);
     }
 
     #[test]

@@ -4,7 +4,6 @@ use machine::Stage;
 use units::{Metres, Short, ShortSpan};
 
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::least_time;
 use crate::config::{AxisConfig, MachineConfig};
 use crate::linear::run_plan::{RunPlan, plan_of, speed_of};
 
@@ -20,7 +19,6 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
         let judge = &mut Judge::at(format!("axis.{name}"), found);
         check_window(judge, axis);
         check_stopping(judge, axis);
-        check_timeout(judge, axis);
         for stage in [Stage::Calibrate, Stage::Verify] {
             check_duration(judge, axis, stage);
         }
@@ -78,24 +76,6 @@ fn check_stopping(judge: &mut Judge<'_>, axis: &AxisConfig) {
                 Short(room)
             ),
             "raise it, lower speed_mm_per_s, or raise soft_min_mm",
-        );
-    }
-}
-
-fn check_timeout(judge: &mut Judge<'_>, axis: &AxisConfig) {
-    let motion = &axis.motion;
-    let travel = motion.soft_max_mm - motion.soft_min_mm;
-    let speed = motion.speed_mm_per_s;
-    let least = least_time(travel, speed, motion.acceleration_mm_per_s2);
-    if least > motion.move_timeout_s {
-        judge.say(
-            "move_timeout_s",
-            format!(
-                "a move over the whole travel of {} mm takes {least:.1} s at {} mm/s",
-                Short(travel),
-                Short(speed)
-            ),
-            format!("give more than {least:.0}, and time to settle"),
         );
     }
 }
@@ -202,13 +182,6 @@ mod tests {
             &edit,
             &[key],
             "takes 4.000 mm, and from soft_min_mm to the limit switch there are 3 mm",
-        );
-        let edit = [("move_timeout_s = 10.0", "move_timeout_s = 0.3")];
-        check(
-            LINEAR,
-            &edit,
-            &["axis.x.move_timeout_s"],
-            "66 mm takes 0.4 s at 200 mm/s",
         );
         let edit = [("settle_ms = 20", "settle_ms = 600000")];
         check(

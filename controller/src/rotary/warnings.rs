@@ -4,7 +4,6 @@ use units::Short;
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::least_time;
 use crate::rotary::RotaryConfig;
 
 const TURN_ARCSEC: f64 = 1_296_000.0;
@@ -15,7 +14,6 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     for (name, table) in &config.rotary {
         let judge = &mut Judge::at(format!("rotary.{name}"), found);
         check_window(judge, table);
-        check_timeout(judge, table);
     }
 }
 
@@ -48,18 +46,6 @@ fn check_window(judge: &mut Judge<'_>, table: &RotaryConfig) {
     }
 }
 
-fn check_timeout(judge: &mut Judge<'_>, table: &RotaryConfig) {
-    let speed = table.speed_deg_per_s;
-    let least = least_time(360.0, speed, table.acceleration_deg_per_s2);
-    if least > table.move_timeout_s {
-        judge.say(
-            "move_timeout_s",
-            format!("a whole turn takes {least:.1} s at {}°/s", Short(speed)),
-            format!("give more than {least:.0}, and time to settle"),
-        );
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use crate::config::warnings::told::check;
@@ -67,7 +53,7 @@ mod tests {
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
 
     #[test]
-    fn windows_and_times_that_do_not_fit_are_told() {
+    fn windows_that_do_not_fit_are_told() {
         let (key, from) = (
             "rotary.c.position_window_arcsec",
             "position_window_arcsec = 0.1",
@@ -85,13 +71,6 @@ mod tests {
             &[(from, "position_window_arcsec = 0.5")],
             &[key],
             says,
-        );
-        let edit = [("move_timeout_s = 60.0", "move_timeout_s = 12.0")];
-        check(
-            ROTARY,
-            &edit,
-            &["rotary.c.move_timeout_s"],
-            "takes 12.2 s at 30°/s",
         );
     }
 }

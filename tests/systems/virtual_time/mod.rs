@@ -40,6 +40,7 @@ mod volumetric_path;
 mod volumetric_resume;
 mod volumetric_rolls;
 mod volumetric_scatter;
+mod volumetric_varied;
 mod volumetric_worse;
 mod warmth;
 mod wrong_position;
