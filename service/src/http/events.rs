@@ -74,7 +74,7 @@ pub(super) async fn events(
     let Query(wanted) = wanted.map_err(|it| Problem::new(Code::BadRequest, it.body_text(), ""))?;
     let place = Arc::clone(&shared.streams).try_acquire_owned();
     let place = place.map_err(|_| {
-        let what = format!("{STREAMS} event streams are open");
+        let what = format!("{STREAMS} event streams are open here");
         Problem::new(Code::Busy, what, "close one")
     })?;
     let resumed = headers.get("last-event-id").and_then(|it| it.to_str().ok());

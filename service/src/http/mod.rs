@@ -1,7 +1,8 @@
 //! The edge: HTTP and JSON on a Unix socket and on TCP. It can hang, be flooded or die; the machine's thread
 //! never waits for it.
 //!
-//! One thread, one tokio runtime of its own. Errors are problems by RFC 9457, `/openapi.json` says what there is.
+//! Each place has a thread and a tokio runtime of its own: what floods one keeps nobody waiting at another. Errors are
+//! problems by RFC 9457, `/openapi.json` says what there is.
 
 mod connection;
 mod door;
@@ -15,33 +16,19 @@ mod place;
 mod places;
 mod rate;
 mod routes;
+mod serving;
 mod state;
 mod tokens;
 
-use core::pin::pin;
-use core::time::Duration;
 use std::io;
-use std::thread::{self, JoinHandle};
 
 use axum::Router;
-use axum::body::Body;
-use axum::extract::ConnectInfo;
-use hyper::Request;
-use hyper::body::Incoming;
-use hyper::server::conn::http1;
-use hyper::service::service_fn;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::sync::{mpsc, oneshot, watch};
-use tokio::time::timeout;
-use tower_service::Service as _;
 
 use crate::access::Access;
 use crate::desk::Desk;
-use connection::Connection;
-use door::{Door, Peer, Socket};
 use guard::Guarded;
 pub use place::{Listen, ListenError};
-use places::{Place, Places};
+use serving::{Opened, Serving};
 use state::{Closing, State};
 
 /// A place that cannot be listened at.
@@ -58,8 +45,7 @@ pub struct EdgeError {
 #[derive(Debug)]
 pub struct Edge {
     places: Vec<Listen>,
-    end: Option<oneshot::Sender<()>>,
-    thread: Option<JoinHandle<()>>,
+    serving: Vec<Serving>,
 }
 
 impl Edge {
@@ -68,38 +54,40 @@ impl Edge {
     /// # Errors
     /// When one of them cannot be listened at, or is open to others than `access` can tell apart.
     pub fn open(desk: Desk, places: &[Listen], access: &Access) -> Result<Self, EdgeError> {
-        let failed = |at: &str| {
-            let at = at.to_owned();
-            move |source| EdgeError { at, source }
-        };
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_io()
-            .enable_time()
-            .build()
-            .map_err(failed("tokio"))?;
-        let inside = runtime.enter();
-        let doors = places.iter().map(|place| {
-            let at = place.to_string();
-            let open = |error| io::Error::new(io::ErrorKind::PermissionDenied, error);
-            let settled = place.clone().settle(access).map_err(open);
-            let door = settled.and_then(|it| Door::open(&it, access));
-            door.map_err(failed(&at))
-        });
-        let doors: Vec<_> = doors.collect::<Result<_, _>>()?;
-        drop(inside);
-        let places = doors.iter().map(|it| it.place().clone()).collect();
-        let access = access.clone();
-        let (end, ended) = oneshot::channel();
-        let thread = thread::Builder::new().name("edge".into()).spawn(move || {
-            runtime.block_on(serve_all(doors, desk, access, ended));
-            // What has not ended by now does not keep it.
-            runtime.shutdown_background();
-        });
-        Ok(Self {
-            places,
-            end: Some(end),
-            thread: Some(thread.map_err(failed("the edge's thread"))?),
+        // One of them looks after the file of tokens for all.
+        let mut tokens = access.tokens.clone();
+        Self::serve(places, access, |place, closing| {
+            if let Some(known) = tokens.take() {
+                tokio::spawn(tokens::watch(known, desk.clone(), closing.clone()));
+            }
+            let state = State::new(desk.clone(), closing);
+            routes::router(state, Guarded::new(place, access))
         })
+    }
+
+    /// The same with what `app` makes for each place, within its runtime.
+    fn serve(
+        places: &[Listen],
+        access: &Access,
+        mut app: impl FnMut(&Listen, Closing) -> Router,
+    ) -> Result<Self, EdgeError> {
+        let opened = places.iter().map(|place| {
+            let at = place.to_string();
+            Opened::at(place, access).map_err(|source| EdgeError { at, source })
+        });
+        // Nobody is served before all are open.
+        let opened: Vec<_> = opened.collect::<Result<_, _>>()?;
+        let mut edge = Self {
+            places: opened.iter().map(|it| it.place().clone()).collect(),
+            serving: Vec::new(),
+        };
+        for (opened, at) in opened.into_iter().zip(places) {
+            let at = at.to_string();
+            let begun = opened.serve(&mut app);
+            let begun = begun.map_err(|source| EdgeError { at, source })?;
+            edge.serving.push(begun);
+        }
+        Ok(edge)
     }
 
     /// Where it is found; ports that were chosen by the system are numbers here.
@@ -110,97 +98,15 @@ impl Edge {
 
 impl Drop for Edge {
     fn drop(&mut self) {
-        self.end.take();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        // All say their last word at the same time.
+        self.serving.iter_mut().for_each(Serving::close);
+        self.serving.clear();
         for place in &self.places {
             if let Listen::Unix(path) = place {
                 let _ = std::fs::remove_file(path);
             }
         }
     }
-}
-
-/// How long a client may take to say which request it has: also how long a connection that asks nothing is kept.
-/// Whoever says half a request would keep one of the places for ever.
-const SAYING_MAX: Duration = Duration::from_secs(10);
-
-/// How long an edge that closes waits for what it still has to say.
-const LAST_WORD: Duration = Duration::from_secs(1);
-
-/// So many connections are served at once at each door.
-const CONNECTIONS: usize = 64;
-/// So long all that is said before a body may be, in bytes.
-const HEAD_MAX: usize = 32 << 10;
-
-/// Until `ended`, and until everybody has been told the last of it.
-async fn serve_all(doors: Vec<Door>, desk: Desk, access: Access, ended: oneshot::Receiver<()>) {
-    let (close, closing) = watch::channel(false);
-    let (open, mut all_gone) = mpsc::channel(1);
-    let closing = Closing(closing);
-    let state = State::new(desk, closing.clone());
-    for door in doors {
-        let guarded = Guarded::new(door.place(), &access);
-        let app = routes::router(state.clone(), guarded);
-        tokio::spawn(serve(door, app, closing.clone(), open.clone()));
-    }
-    if let Some(known) = access.tokens {
-        tokio::spawn(tokens::watch(known, state.desk, closing));
-    }
-    drop(open);
-    // Whoever opened it has gone, or wants it to end.
-    let _ = ended.await;
-    close.send_replace(true);
-    // Nothing is ever sent: there is an end when the last connection has dropped its copy.
-    let _ = timeout(LAST_WORD, all_gone.recv()).await;
-}
-
-/// Held by whatever is not over yet.
-type Open = mpsc::Sender<()>;
-
-async fn serve(mut door: Door, app: Router, mut closing: Closing, open: Open) {
-    let places = Places::new(CONNECTIONS);
-    loop {
-        let ((socket, peer), place) = tokio::select! {
-            accepted = async { (door.accept().await, places.take().await) } => accepted,
-            () = closing.begun() => return,
-        };
-        let (app, closing, open) = (app.clone(), closing.clone(), open.clone());
-        tokio::spawn(async move {
-            tokio::select! {
-                () = answer(socket, peer, &place, app, closing) => {}
-                () = place.lost() => {}
-            }
-            drop(open);
-        });
-    }
-}
-
-/// The requests of one connection, until it is closed or says nothing more.
-async fn answer(socket: Socket, peer: Peer, place: &Place, app: Router, mut closing: Closing) {
-    // Whoever hangs up, or says what is no TLS or no HTTP, is not waited for.
-    let Ok(connection) = Connection::of(socket).await else {
-        return;
-    };
-    let keeps = place.keeps();
-    let asked = service_fn(move |request: Request<Incoming>| {
-        let mut request = request.map(Body::new);
-        request.extensions_mut().insert(ConnectInfo(peer.clone()));
-        request.extensions_mut().insert(keeps.clone());
-        app.clone().call(request)
-    });
-    let mut server = http1::Builder::new();
-    server
-        .timer(TokioTimer::new())
-        .header_read_timeout(SAYING_MAX)
-        .max_buf_size(HEAD_MAX);
-    let mut served = pin!(server.serve_connection(TokioIo::new(connection), asked));
-    tokio::select! {
-        _ = served.as_mut() => return,
-        () = closing.begun() => served.as_mut().graceful_shutdown(),
-    }
-    let _ = served.await;
 }
 
 /// What the interface is, as OpenAPI 3.1.
@@ -210,7 +116,64 @@ pub fn openapi() -> utoipa::openapi::OpenApi {
 
 #[cfg(test)]
 mod tests {
+    use core::time::Duration;
+    use std::io::{Read, Write};
+    use std::net::TcpStream;
+    use std::os::unix::net::UnixStream;
+    use std::sync::{Arc, Barrier};
+
+    use axum::routing::get;
+
     use super::*;
+
+    /// What is answered in a moment is not answered any more after so long.
+    const LATE: Duration = Duration::from_secs(60);
+    const ASK: &[u8] = b"GET / HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n";
+
+    /// A thread that does nothing else any more is the worst that a flood can make of it.
+    #[test]
+    fn whoever_asks_at_one_place_does_not_wait_for_what_keeps_another_busy() {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("socket");
+        let places = [
+            "tcp:127.0.0.1:0".parse().unwrap(),
+            Listen::Unix(socket.clone()),
+        ];
+        let held = Arc::new(Barrier::new(2));
+        let edge = Edge::serve(&places, &Access::default(), |place, _| {
+            let held = matches!(place, Listen::Tcp(_)).then(|| Arc::clone(&held));
+            Router::new().route(
+                "/",
+                get(async move || {
+                    // Once when it is reached, and once when it may go on.
+                    held.iter().for_each(|it| {
+                        it.wait();
+                        it.wait();
+                    });
+                    "answered"
+                }),
+            )
+        });
+        let edge = edge.unwrap();
+        let Listen::Tcp(address) = edge.places()[0] else {
+            panic!("it is TCP")
+        };
+        let mut strangers = TcpStream::connect(address).unwrap();
+        strangers.write_all(ASK).unwrap();
+        held.wait();
+        let mut own = UnixStream::connect(&socket).unwrap();
+        own.set_read_timeout(Some(LATE)).unwrap();
+        own.write_all(ASK).unwrap();
+        let mut said = String::new();
+        let heard = own.read_to_string(&mut said);
+        held.wait();
+        assert!(heard.is_ok() && said.ends_with("answered"), "{said}");
+        let mut said = String::new();
+        strangers.read_to_string(&mut said).unwrap();
+        assert!(said.ends_with("answered"), "{said}");
+        drop(edge);
+        assert!(!socket.exists());
+    }
 
     /// What is not in the description is not part of the interface.
     #[test]

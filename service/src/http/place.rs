@@ -61,6 +61,17 @@ impl Listen {
     }
 }
 
+impl Listen {
+    /// What its text begins with.
+    pub(super) const fn word(&self) -> &'static str {
+        match self {
+            Self::Unix(_) => "unix",
+            Self::Tcp(_) => "tcp",
+            Self::Tls(_) => "tls",
+        }
+    }
+}
+
 impl FromStr for Listen {
     type Err = ListenError;
 
@@ -80,10 +91,10 @@ impl FromStr for Listen {
 
 impl fmt::Display for Listen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = self.word();
         match self {
-            Self::Unix(path) => write!(f, "unix:{}", path.display()),
-            Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Tls(address) => write!(f, "tls:{address}"),
+            Self::Unix(path) => write!(f, "{word}:{}", path.display()),
+            Self::Tcp(address) | Self::Tls(address) => write!(f, "{word}:{address}"),
         }
     }
 }

@@ -6,10 +6,10 @@ use tokio::sync::{Semaphore, watch};
 
 use crate::desk::Desk;
 
-/// So many streams of events are open at once.
+/// So many streams of events are open at once at each place.
 pub(super) const STREAMS: usize = 16;
 
-/// Where it asks, and what all connections share.
+/// Where it asks, and what all connections of a place share.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) desk: Desk,

@@ -54,6 +54,7 @@ impl Figure {
                 by_itself(&measured.quiet),
                 frame(&measured.quiet),
                 frame(measured.of(Load::Flood)),
+                frame(measured.of(Load::Elsewhere)),
             ],
             Self::Frame => [&measured.quiet]
                 .into_iter()

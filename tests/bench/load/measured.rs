@@ -15,6 +15,10 @@ use crate::today;
 
 /// As often as the command line moves.
 const TODAY: usize = 3;
+/// How whoever asks becomes a program that gives way: Linux shares processors between sessions first, and `nice` counts within
+/// one. In the session of what is measured it would be the kernel's workers that wait.
+const GIVES_WAY: &str =
+    r#"{ echo 10 >/proc/self/autogroup; } 2>/dev/null; exec nice -n 39 "$0" "$@""#;
 /// Figures are taken once a second.
 const SETTLED: Duration = Duration::from_millis(1500);
 
@@ -49,8 +53,9 @@ impl Load {
             Self::Flood | Self::Elsewhere => "flood",
         };
         let program = std::env::current_exe().unwrap();
-        let mut command = Command::new("nice");
-        command.args(["-n", "39"]).arg(program);
+        // Each becomes the next: it is ended as one.
+        let mut command = Command::new("setsid");
+        command.args(["sh", "-c", GIVES_WAY]).arg(program);
         command.args(["ask", what, &place, "3600"]);
         Ending(command.spawn().unwrap())
     }
