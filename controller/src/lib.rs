@@ -58,6 +58,8 @@ mod groups;
 mod handle;
 mod hardware;
 mod homing;
+#[cfg(feature = "program")]
+mod jogging;
 mod kinds;
 pub mod linear;
 mod made_by;

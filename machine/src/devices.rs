@@ -7,7 +7,7 @@ use drivers::device::{
     AnalogInput, Axis, AxisReading, Device, DisplacementInstrument, Identity, LineUse,
     PoseInstrument, RotaryAxis, ServoDrive,
 };
-use units::{Radians, Time};
+use units::{Approach, Radians, Time};
 use wire::{Payload, Port, Ports};
 
 use crate::failure::Failure;
@@ -250,6 +250,20 @@ impl Devices {
     /// When there is no such axis.
     pub fn rotary_reading(&self, axis: &str) -> Result<Option<AxisReading<Radians>>, Failure> {
         Ok(self.rotaries[self.rotary_index(axis)?].device.reading())
+    }
+
+    /// The last position in this direction that the rotary axis `axis` can be sent to from where it is, as its drive
+    /// counts; `None` before its first sample.
+    ///
+    /// # Errors
+    /// When there is no such axis.
+    pub fn rotary_last_position(
+        &self,
+        axis: &str,
+        way: Approach,
+    ) -> Result<Option<Radians>, Failure> {
+        let at = self.rotary_index(axis)?;
+        Ok(self.rotaries[at].device.last_position(way))
     }
 
     /// The driver of `instrument`.

@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use units::{Metres, MetresPerSecond, Radians, text};
+use units::{AxisSpeed, Metres, Radians, text};
 use utoipa::ToSchema;
 
 mod form;
@@ -18,7 +18,7 @@ use crate::coordinate::Coordinate;
 pub struct Quantity {
     /// How much.
     pub value: f64,
-    /// Of what: `mm`, `um`, `deg`, `arcsec`, `mm/s`.
+    /// Of what: `mm`, `um`, `deg`, `arcsec`, `mm/s`, `rad/s`.
     pub unit: String,
 }
 
@@ -118,18 +118,27 @@ impl Written for Coordinate {
     }
 }
 
-/// A speed as it goes in: `"20mm/s"` or `{"value": 20, "unit": "mm/s"}`.
+/// A speed as it goes in: `"20mm/s"`, `"5deg/s"` or `{"value": 20, "unit": "mm/s"}`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speed(pub MetresPerSecond);
+pub struct Speed(pub AxisSpeed);
+
+impl<S: Into<AxisSpeed>> From<S> for Speed {
+    fn from(speed: S) -> Self {
+        Self(speed.into())
+    }
+}
 
 impl Written for Speed {
-    const EXPECTED: &'static str = "a speed with its unit (m/s, mm/s or um/s): \"20mm/s\" or \
+    const EXPECTED: &'static str = "a speed with its unit (m/s, mm/s or um/s), or an angular speed of an axis that \
+                                    turns (deg/s, arcmin/s, arcsec/s, mrad/s, rad/s or rpm): \"20mm/s\" or \
                                     {\"value\": 20, \"unit\": \"mm/s\"}";
-    const UNITS: &'static [&'static str] = &["m/s", "mm/s", "um/s"];
+    const UNITS: &'static [&'static str] = &[
+        "m/s", "mm/s", "um/s", "deg/s", "arcmin/s", "arcsec/s", "mrad/s", "rad/s", "rpm",
+    ];
     const TYPED: &'static [&'static str] = &["µm/s"];
 
     fn from_text(text: &str) -> Option<Self> {
-        text::speed(text).map(Self)
+        text::axis_speed(text).map(Self)
     }
 }
 
@@ -187,13 +196,22 @@ written!(Coordinate, |it: &Coordinate| match it {
         unit: "rad".into(),
     },
 });
-written!(Speed, |it: &Speed| Quantity {
-    value: it.0.value() * 1e3,
-    unit: "mm/s".into(),
+written!(Speed, |it: &Speed| match it.0 {
+    AxisSpeed::Linear(it) => Quantity {
+        value: it.value() * 1e3,
+        unit: "mm/s".into(),
+    },
+    // As with angles.
+    AxisSpeed::Angular(it) => Quantity {
+        value: it.value(),
+        unit: "rad/s".into(),
+    },
 });
 
 #[cfg(test)]
 mod tests {
+    use units::{MetresPerSecond, RadiansPerSecond};
+
     use super::*;
 
     #[test]
@@ -239,8 +257,39 @@ mod tests {
             let text = serde_json::to_string(&place).unwrap();
             assert_eq!(serde_json::from_str::<Coordinate>(&text).unwrap(), place);
         }
-        let speed: Speed = serde_json::from_str("\"20mm/s\"").unwrap();
-        let text = serde_json::to_string(&speed).unwrap();
-        assert_eq!(serde_json::from_str::<Speed>(&text).unwrap(), speed);
+        for speed in ["\"20mm/s\"", "\"-12.3arcsec/s\"", "\"0.7rpm\""] {
+            let speed: Speed = serde_json::from_str(speed).unwrap();
+            let text = serde_json::to_string(&speed).unwrap();
+            assert_eq!(serde_json::from_str::<Speed>(&text).unwrap(), speed);
+        }
+    }
+
+    #[test]
+    fn a_speed_is_along_a_way_or_round_a_turn_and_says_which() {
+        let read = |text: &str| serde_json::from_str::<Speed>(text).map(|it| it.0);
+        let linear = AxisSpeed::from(MetresPerSecond(-0.5 * 1e-3));
+        assert_eq!(read("\"-0.5 mm/s\"").unwrap(), linear);
+        let angular = AxisSpeed::from(RadiansPerSecond(core::f64::consts::PI));
+        for text in [
+            "\"180deg/s\"",
+            "\"30 rpm\"",
+            r#"{"value": 180, "unit": "deg/s"}"#,
+        ] {
+            assert_eq!(read(text).unwrap(), angular, "{text}");
+        }
+        for text in [
+            "5",
+            "\"5deg\"",
+            "\"5rad\"",
+            "\"5turns/s\"",
+            "\"5 °/s\"",
+            "\"nandeg/s\"",
+        ] {
+            let said = read(text).unwrap_err().to_string();
+            assert!(
+                said.contains("deg/s") && said.contains("\"20mm/s\""),
+                "{said}"
+            );
+        }
     }
 }

@@ -46,7 +46,8 @@ pub struct MoveRequest {
     /// of a platform (x, y, theta) and of three axes that are corrected together move as one.
     #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
-    /// How fast each may be at most; the usual speed of its configuration when left out. For axes along a way.
+    /// How fast each may be at most; the usual speed of its configuration when left out. An angular speed where they
+    /// turn. Not for axes that move as one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<TravelSpeedIn>)]
     pub speed: Option<Speed>,
@@ -125,7 +126,8 @@ impl From<WayName> for Way {
 pub struct JogRequest {
     /// Which axis.
     pub axis: String,
-    /// How fast, and with its sign which way; 0 ends the jog. At most the usual speed of its configuration.
+    /// How fast, and with its sign which way; 0, in any unit, ends the jog. At most the usual speed of its
+    /// configuration. An angular speed (`5deg/s`) of an axis that turns.
     #[schema(value_type = SpeedIn, example = "-2mm/s")]
     pub speed: Speed,
 }

@@ -1,7 +1,8 @@
 //! `truestage jog`: an axis that runs as long as somebody says so.
 
 use nix::sys::signal::Signal;
-use serde_json::json;
+use serde_json::{Value, json};
+use tests::{ROTARY, Shipped};
 
 use crate::held::Brake;
 use crate::programs::{Bench, live_rigs, number};
@@ -25,6 +26,29 @@ fn an_axis_is_jogged_for_a_time_and_to_its_soft_limit() {
 }
 
 #[test]
+fn a_table_is_jogged_for_a_time_either_way() {
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, ROTARY, |text| text);
+        let stands = |speed: &str| {
+            let jogged = bench.run(&["jog", "machine.toml", speed, "--for", "1s"]);
+            let jogged = jogged.with_code(0);
+            assert_eq!(jogged["at_last_count"], false, "{jogged}");
+            number(&jogged["encoder_deg"])
+        };
+        // Both from where its zero leaves it.
+        let apart = stands("c=20deg/s") - stands("c=-20deg/s");
+        assert!((34.0..=46.0).contains(&apart), "{apart} degrees");
+        let refused = |words: &str, said: &str| {
+            let refused = bench.run(&["jog", "machine.toml", words]).with_code(2);
+            assert!(refused["error"].to_string().contains(said), "{refused}");
+        };
+        refused("c=2mm/s", "axis c turns");
+        refused("c=40deg/s", "faster than it usually moves");
+        refused("c=5deg", "with a sign and a unit");
+    }
+}
+
+#[test]
 fn a_jog_that_makes_no_sense_is_refused_before_anything_moves() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
@@ -36,6 +60,7 @@ fn a_jog_that_makes_no_sense_is_refused_before_anything_moves() {
         refused(&["x=2"], "with a sign and a unit");
         refused(&["x=0mm/s"], "with a sign and a unit");
         refused(&["x=900mm/s"], "faster than it usually moves");
+        refused(&["x=5deg/s"], "goes along a way");
         refused(&["q=2mm/s"], "q");
         let zeros = std::fs::read_dir(bench.records().join("runs"));
         assert_eq!(zeros.map_or(0, Iterator::count), 0, "it zeroed nothing");
@@ -71,4 +96,39 @@ fn a_machine_that_a_service_keeps_is_jogged_as_long_as_the_jog_is_renewed() {
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }
+}
+
+/// `jog` says the same without a service and with one, and neither does what makes no sense.
+fn check_kept(shipped: Shipped, jog: &str, refused: &[(&str, &str)]) {
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, shipped, |text| text);
+        let refuses = || {
+            for (words, said) in refused {
+                let refused = bench.run(&["jog", "machine.toml", words]).with_code(2);
+                assert!(refused["error"].to_string().contains(said), "{refused}");
+            }
+        };
+        refuses();
+        let names = |value: &Value| -> Vec<String> {
+            let members = value.as_object().expect("an object").keys();
+            members.filter(|it| *it != "counters").cloned().collect()
+        };
+        let here = bench.run(&["jog", "machine.toml", jog, "--for", "0.5s"]);
+        let here = names(&here.with_code(0));
+        let service = keep(&bench);
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        refuses();
+        let brake = Brake::on(&bench);
+        let there = bench.run(&["jog", "machine.toml", jog, "--for", "2s"]);
+        assert_eq!(names(&there.with_code(0)), here);
+        drop(brake);
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
+#[test]
+fn a_kept_table_is_jogged_as_one_without_a_service_is() {
+    let refused = [("c=2mm/s", "axis c turns"), ("q=2deg/s", "q")];
+    check_kept(ROTARY, "c=-20deg/s", &refused);
 }

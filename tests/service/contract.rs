@@ -18,7 +18,7 @@ mod turns;
 use core::time::Duration;
 use std::path::Path;
 
-use service::{Caller, Code, Coordinate, MotionState, MotionView, MoveRequest, Problem, Speed};
+use service::{Caller, Code, Coordinate, MotionState, MotionView, MoveRequest, Problem};
 use tests::{Edit, LINEAR, Rig, VOLUMETRIC};
 use units::{Metres, MetresPerSecond};
 
@@ -139,7 +139,7 @@ fn compensated(axis: &str, mm: f64) -> MoveRequest {
 /// A motion that takes minutes.
 fn slowly(axis: &str, mm: f64) -> MoveRequest {
     MoveRequest {
-        speed: Some(Speed(MetresPerSecond(0.1e-3))),
+        speed: Some(MetresPerSecond(0.1e-3).into()),
         ..to(axis, mm)
     }
 }

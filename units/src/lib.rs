@@ -19,6 +19,7 @@
 //! assert!(speed < MetresPerSecond(0.025));
 //! ```
 
+mod axis_speed;
 mod coordinate;
 mod counts;
 pub mod portable;
@@ -27,6 +28,7 @@ mod short;
 pub mod text;
 mod time;
 
+pub use axis_speed::AxisSpeed;
 pub use coordinate::{Coordinate, LengthOrAngle};
 pub use counts::{Counts, Scale};
 pub use quantity::{

@@ -1,6 +1,6 @@
 //! Quantities as a person types them: the unit is never guessed.
 
-use crate::{Metres, MetresPerSecond, Radians};
+use crate::{AxisSpeed, Metres, MetresPerSecond, Radians, RadiansPerSecond};
 
 const LENGTHS: [(&str, f64); 5] = [
     ("mm", 1e-3),
@@ -11,6 +11,25 @@ const LENGTHS: [(&str, f64); 5] = [
 ];
 
 const SPEEDS: [(&str, f64); 4] = [("mm/s", 1e-3), ("um/s", 1e-6), ("µm/s", 1e-6), ("m/s", 1.0)];
+
+const DEGREE: f64 = 1.0_f64.to_radians();
+
+const ANGLES: [(&str, f64); 5] = [
+    ("arcsec", DEGREE / 3600.0),
+    ("arcmin", DEGREE / 60.0),
+    ("deg", DEGREE),
+    ("mrad", 1e-3),
+    ("rad", 1.0),
+];
+
+const ANGULAR_SPEEDS: [(&str, f64); 6] = [
+    ("arcsec/s", DEGREE / 3600.0),
+    ("arcmin/s", DEGREE / 60.0),
+    ("deg/s", DEGREE),
+    ("mrad/s", 1e-3),
+    ("rad/s", 1.0),
+    ("rpm", core::f64::consts::TAU / 60.0),
+];
 
 /// A length such as `-300um` or `12.5 mm`; `None` for anything else, a bare number included.
 ///
@@ -45,15 +64,34 @@ pub fn speed(text: &str) -> Option<MetresPerSecond> {
 /// assert_eq!(text::angle("1"), None);
 /// ```
 pub fn angle(text: &str) -> Option<Radians> {
-    let degree = 1.0_f64.to_radians();
-    let units = [
-        ("arcsec", degree / 3600.0),
-        ("arcmin", degree / 60.0),
-        ("deg", degree),
-        ("mrad", 1e-3),
-        ("rad", 1.0),
-    ];
-    measure(text, &units).map(Radians)
+    measure(text, &ANGLES).map(Radians)
+}
+
+/// An angular speed such as `5deg/s`, `10arcsec/s` or `2rpm` (turns per minute).
+///
+/// ```
+/// use units::{RadiansPerSecond, text};
+///
+/// assert_eq!(text::angular_speed("180deg/s"), Some(RadiansPerSecond(core::f64::consts::PI)));
+/// assert_eq!(text::angular_speed("30rpm"), text::angular_speed("180deg/s"));
+/// assert_eq!(text::angular_speed("5deg"), None);
+/// ```
+pub fn angular_speed(text: &str) -> Option<RadiansPerSecond> {
+    measure(text, &ANGULAR_SPEEDS).map(RadiansPerSecond)
+}
+
+/// Whichever of [`speed`] and [`angular_speed`] it is.
+///
+/// ```
+/// use units::{MetresPerSecond, RadiansPerSecond, text};
+///
+/// assert_eq!(text::axis_speed("-2m/s"), Some(MetresPerSecond(-2.0).into()));
+/// assert_eq!(text::axis_speed("2rad/s"), Some(RadiansPerSecond(2.0).into()));
+/// assert_eq!(text::axis_speed("2"), None, "the unit is never guessed");
+/// ```
+pub fn axis_speed(text: &str) -> Option<AxisSpeed> {
+    let linear = speed(text).map(AxisSpeed::from);
+    linear.or_else(|| angular_speed(text).map(AxisSpeed::from))
 }
 
 fn measure(text: &str, units: &[(&str, f64)]) -> Option<f64> {

@@ -17,7 +17,7 @@ pub(crate) mod gantry;
 mod golden;
 pub(crate) mod job;
 #[cfg(feature = "program")]
-pub(crate) mod jog;
+mod jog;
 mod kind;
 mod log;
 pub(crate) mod measure;

@@ -20,6 +20,7 @@ mod exchange;
 mod explain;
 mod intended;
 mod jog;
+mod jogs;
 mod journal;
 mod json;
 mod kept;
@@ -117,7 +118,8 @@ enum Command {
     Verify(VerifyArgs),
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
-    /// Zero, then run an axis at a speed, to its soft limit, for a time, or until Ctrl-C: `truestage jog x=2mm/s`.
+    /// Zero, then run an axis at a speed, to its soft limit, for a time, or until Ctrl-C: `truestage jog x=2mm/s`,
+    /// `truestage jog c=5deg/s`.
     Jog(jog::JogArgs),
     /// Zero, then record the references of the detectors of three axes, for the calibration in use; or take them
     /// from a file (`reference import`).

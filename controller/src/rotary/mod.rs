@@ -27,6 +27,8 @@ mod golden;
 #[cfg(feature = "program")]
 pub(crate) mod harmonics;
 mod in_use;
+#[cfg(feature = "program")]
+mod jog;
 mod kind;
 mod line_speed;
 mod log;

@@ -1,7 +1,7 @@
 //! Positions that a drive latches in hardware at the edges of an input: a touch probe, a line
 //! detector.
 
-use units::{Coordinate, Counts, Metres, Radians, Time};
+use units::{Approach, Coordinate, Counts, Metres, Radians, Time};
 
 use super::{Axis, DeviceError, ServoDrive};
 
@@ -73,7 +73,9 @@ pub struct Latched<Q: Coordinate = Metres> {
     pub missed: u32,
 }
 
-/// A rotary axis with a latch: what a table needs to be calibrated.
-pub trait RotaryAxis: Axis<Radians> + PositionLatch<Radians> {}
-
-impl<D: Axis<Radians> + PositionLatch<Radians>> RotaryAxis for D {}
+/// A rotary axis that turns on and on, with a latch: what a table needs to be calibrated.
+pub trait RotaryAxis: Axis<Radians> + PositionLatch<Radians> {
+    /// The last position in this direction that the drive can be sent to from where it is; the angle counts on over the
+    /// turns. `None` before its first sample.
+    fn last_position(&self, way: Approach) -> Option<Radians>;
+}

@@ -4,6 +4,7 @@ mod accept;
 mod going;
 mod jog;
 mod shown;
+mod speed;
 mod together;
 
 use core::time::Duration;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 use machine::{Failure, Machine};
 use serde_json::json;
 use truestage::linear::Corrected;
-use units::{MetresPerSecond, Time};
+use units::{AxisSpeed, Time};
 
 use self::going::{Going, Wanted};
 use self::together::Together;
@@ -100,7 +101,7 @@ pub(super) struct Motion {
     wanted: Wanted,
     dead_man: Option<(Duration, Time)>,
     /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
-    jog: Option<MetresPerSecond>,
+    jog: Option<AxisSpeed>,
     legs: Vec<Leg>,
     /// Its axes move as one: then it has no legs.
     together: Option<Together>,

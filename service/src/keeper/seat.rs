@@ -3,8 +3,7 @@
 use core::time::Duration;
 use std::sync::Arc;
 
-use machine::{AxisSettings, Machine};
-use truestage::linear::Course;
+use machine::Machine;
 use truestage::runs::Moved;
 use units::Time;
 use wire::cia402::PowerState;
@@ -115,14 +114,6 @@ impl Seat {
         let left_by_a_loop = self.moved == Moved::CorrectedTogether;
         self.is_in_position(machine.now())
             || left_by_a_loop && self.mechanics.is_at_rest(machine, &self.name)
-    }
-
-    /// Within which it is moved, and what corrects that, where it goes along a way.
-    pub(super) fn linear(&self) -> Option<(&AxisSettings, &Course)> {
-        match &self.mechanics {
-            Mechanics::Linear(it) => Some((&it.settings, &it.course)),
-            Mechanics::Turning(_) => None,
-        }
     }
 
     /// What it does.

@@ -150,10 +150,10 @@ described!(
 described!(
     /// A [`Speed`] with its direction in the description.
     SpeedIn,
-    described::<Speed>("Speed", "A speed, with its sign", &any_number(), false)
+    described::<Speed>("Speed", "A speed, or an angular speed of an axis that turns, with its sign", &any_number(), false)
 );
 described!(
     /// A [`Speed`] that is positive in the description.
     TravelSpeedIn,
-    described::<Speed>("TravelSpeed", "A speed that is not 0", &positive_number(), true)
+    described::<Speed>("TravelSpeed", "A speed, or an angular speed of axes that turn, that is not 0", &positive_number(), true)
 );

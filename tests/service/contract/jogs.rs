@@ -2,10 +2,13 @@
 
 use core::time::Duration;
 
-use service::{AxisState, Code, JogRequest, MotionState, Speed};
-use units::MetresPerSecond;
+use service::{AxisState, Code, JogRequest, MotionState, MoveRequest, StopMode, WayName};
+use tests::{Edit, ROTARY};
+use units::{MetresPerSecond, RadiansPerSecond};
 
-use super::{Bed, anna, bert, slowly, to, with_stage, with_zeroed_stage};
+use super::turns::{turned, with_table};
+use super::{Bed, SEED, anna, bert, each_here, slowly, to, with_stage, with_zeroed_stage, zeroed};
+use crate::stage::Stage;
 
 /// So much passes for each request by the machine's clock, however slow it is on the wall.
 const OFTEN: Duration = Duration::from_millis(8);
@@ -13,23 +16,30 @@ const OFTEN: Duration = Duration::from_millis(8);
 fn jog(mm_per_s: f64) -> JogRequest {
     JogRequest {
         axis: "x".into(),
-        speed: Speed(MetresPerSecond(mm_per_s * 1e-3)),
+        speed: MetresPerSecond(mm_per_s * 1e-3).into(),
+    }
+}
+
+fn turning(deg_per_s: f64) -> JogRequest {
+    JogRequest {
+        axis: "c".into(),
+        speed: RadiansPerSecond(deg_per_s.to_radians()).into(),
     }
 }
 
 impl Bed<'_> {
-    fn jogs(&self, mm_per_s: f64) -> String {
-        let jogs = self.client.jog(&anna(), &jog(mm_per_s));
+    fn jogs(&self, request: &JogRequest) -> String {
+        let jogs = self.client.jog(&anna(), request);
         jogs.unwrap_or_else(|problem| panic!("{problem}"))
     }
 
     /// Renews a jog for so long by the machine's clock.
-    fn keeps_jogging(&self, mm_per_s: f64, seconds: f64) -> String {
+    fn keeps_jogging(&self, request: &JogRequest, seconds: f64) -> String {
         self.stage.gate.limit(OFTEN);
         let begun = self.client.machine().clock_s;
-        let mut id = self.jogs(mm_per_s);
+        let mut id = self.jogs(request);
         while self.client.machine().clock_s - begun < seconds {
-            id = self.jogs(mm_per_s);
+            id = self.jogs(request);
         }
         id
     }
@@ -44,7 +54,7 @@ fn a_jog_runs_as_long_as_it_is_renewed_and_stops_when_nobody_renews_it() {
     with_zeroed_stage(|bed| {
         let from = bed.encoder_mm("x");
         // Five times as long as an axis runs without being told so.
-        let id = bed.keeps_jogging(2.0, 1.0);
+        let id = bed.keeps_jogging(&jog(2.0), 1.0);
         let axis = bed.client.axis("x").unwrap();
         assert_eq!(axis.state, AxisState::ContinuousMotion);
         assert_eq!(bed.now(&id).state, MotionState::Moving);
@@ -68,10 +78,10 @@ fn a_jog_runs_as_long_as_it_is_renewed_and_stops_when_nobody_renews_it() {
 #[test]
 fn a_speed_of_zero_ends_a_jog_and_the_other_way_begins_another_one() {
     with_zeroed_stage(|bed| {
-        let first = bed.keeps_jogging(2.0, 0.3);
-        let back = bed.keeps_jogging(-2.0, 0.3);
+        let first = bed.keeps_jogging(&jog(2.0), 0.3);
+        let back = bed.keeps_jogging(&jog(-2.0), 0.3);
         assert_ne!(first, back);
-        assert_eq!(bed.jogs(0.0), back);
+        assert_eq!(bed.jogs(&jog(0.0)), back);
         bed.lets_go();
         let view = bed.ended(&first);
         assert_eq!(view.state, MotionState::Stopped, "{view:?}");
@@ -90,7 +100,7 @@ fn a_jog_ends_at_the_soft_limit() {
         let limit = bed.client.axis("x").unwrap().soft_max.unwrap().value;
         let near = bed.begin(&to("x", limit - 0.5));
         assert_eq!(bed.ended(&near).state, MotionState::Done);
-        let id = bed.keeps_jogging(5.0, 0.5);
+        let id = bed.keeps_jogging(&jog(5.0), 0.5);
         bed.lets_go();
         assert_eq!(bed.ended(&id).state, MotionState::Done);
         assert!((bed.encoder_mm("x") - limit).abs() < 1e-3);
@@ -123,5 +133,112 @@ fn what_must_not_move_is_not_jogged() {
         };
         let unknown = bed.client.jog(&anna(), &unknown).unwrap_err();
         assert_eq!(unknown.code, Code::NoSuchAxis);
+        bed.client.stop(&anna(), StopMode::Controlled).unwrap();
+        bed.ended(&moving);
+        let here = bed.encoder_mm("x");
+        let round = JogRequest {
+            axis: "x".into(),
+            ..turning(5.0)
+        };
+        let round = bed.client.jog(&anna(), &round).unwrap_err();
+        assert_eq!(round.code, Code::NotOffered);
+        assert!(round.to_string().contains("\"2mm/s\""), "{round}");
+        bed.let_time_pass(0.3);
+        assert!((bed.encoder_mm("x") - here).abs() < 1e-3, "it moved");
     });
+}
+
+#[test]
+fn a_table_is_jogged_across_its_seam_as_long_as_that_is_renewed() {
+    with_table(|bed| {
+        let from = bed.turns_to(&turned(-5.0));
+        let id = bed.keeps_jogging(&turning(20.0), 1.0);
+        let axis = bed.client.axis("c").unwrap();
+        assert_eq!(axis.state, AxisState::ContinuousMotion);
+        assert_eq!(bed.now(&id).state, MotionState::Moving);
+        let so_far = bed.encoder_mm("c") - from;
+        assert!((15.0..=22.0).contains(&so_far), "{so_far} degrees in 1 s");
+        bed.lets_go();
+        let view = bed.ended(&id);
+        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
+        assert_eq!(view.stopped.unwrap().by, "the dead-man of anna");
+        let on = bed.encoder_mm("c") - from - so_far;
+        assert!((0.0..=7.0).contains(&on), "{on} degrees without a word");
+        assert_eq!(
+            bed.client.axis("c").unwrap().state,
+            AxisState::Standstill,
+            "it stays enabled"
+        );
+    });
+}
+
+#[test]
+fn a_table_turns_back_from_rest_and_a_speed_of_zero_ends_that_in_any_unit() {
+    with_table(|bed| {
+        let zero = JogRequest {
+            axis: "c".into(),
+            ..jog(0.0)
+        };
+        let nothing = bed.client.jog(&anna(), &zero).unwrap_err();
+        assert_eq!(nothing.code, Code::NoSuchMotion);
+        let along = JogRequest {
+            axis: "c".into(),
+            ..jog(2.0)
+        };
+        let along = bed.client.jog(&anna(), &along).unwrap_err();
+        assert_eq!(along.code, Code::NotOffered);
+        assert!(along.to_string().contains("2 mm/s"), "{along}");
+        assert!(along.to_string().contains("\"5deg/s\""), "{along}");
+        bed.let_time_pass(0.2);
+        let here = bed.encoder_mm("c");
+
+        let first = bed.keeps_jogging(&turning(20.0), 0.3);
+        // Faster than it usually turns.
+        let back = bed.keeps_jogging(&turning(-170.0), 1.0);
+        assert_ne!(first, back);
+        assert_eq!(bed.jogs(&zero), back);
+        bed.lets_go();
+        let view = bed.ended(&first);
+        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
+        assert_eq!(bed.ended(&back).stopped.unwrap().by, "anna");
+        let turned_back = here - bed.encoder_mm("c");
+        assert!((10.0..=32.0).contains(&turned_back), "{turned_back}");
+        bed.client.power(&anna(), "c", false).unwrap();
+        let off = bed.client.jog(&anna(), &turning(5.0)).unwrap_err();
+        assert_eq!(off.code, Code::AxisDisabled);
+    });
+}
+
+/// Where the drive's register ends, at 2^31 counts of which a turn has 129 600 000.
+const LAST_DEG: f64 = 5965.232;
+
+#[test]
+fn a_table_whose_drive_counts_on_is_jogged_to_its_last_count_and_back() {
+    let counts_on = |text: String| {
+        text.edit("\"to_last_count\"   #", "\"counts_on\"   #")
+            .edit("\nspeed_deg_per_s = 30.0", "\nspeed_deg_per_s = 180.0")
+    };
+    let new = |rig, folder: &std::path::Path| Stage::new(rig, (ROTARY, SEED), folder, counts_on);
+    let body = |bed: &Bed<'_>| {
+        let near = MoveRequest {
+            way: Some(WayName::Turns),
+            ..turned(LAST_DEG - 20.0)
+        };
+        bed.turns_to(&near);
+        let id = bed.keeps_jogging(&turning(100.0), 0.6);
+        bed.lets_go();
+        let view = bed.ended(&id);
+        assert_eq!(view.state, MotionState::Done, "{view:?}");
+        let short = LAST_DEG - bed.encoder_mm("c");
+        // By its following error limit.
+        assert!((600.0 / 3600.0 - 0.001..0.2).contains(&short), "{short}");
+        let again = bed.jogs(&turning(100.0));
+        assert_eq!(bed.ended(&again).state, MotionState::Done);
+        let back = bed.keeps_jogging(&turning(-100.0), 0.6);
+        bed.lets_go();
+        assert_eq!(bed.ended(&back).state, MotionState::Stopped);
+        let back = LAST_DEG - bed.encoder_mm("c");
+        assert!((20.0..90.0).contains(&back), "{back}");
+    };
+    each_here(new, zeroed(body));
 }

@@ -4,13 +4,13 @@ use service::{
     AxisState, Code, Coordinate, MotionState, MoveRequest, RunKind, RunState, StopMode, WayName,
 };
 use tests::ROTARY;
-use units::Radians;
+use units::{Radians, RadiansPerSecond};
 
 use super::questions::{Hand, few_placements};
 use super::{Bed, SEED, anna, bert, each, to, zeroed};
 use crate::stage::Stage;
 
-fn turned(degrees: f64) -> MoveRequest {
+pub(super) fn turned(degrees: f64) -> MoveRequest {
     MoveRequest {
         uncompensated: true,
         ..corrected(degrees)
@@ -21,7 +21,7 @@ fn corrected(degrees: f64) -> MoveRequest {
     MoveRequest::of("c", Radians::from_degrees(degrees))
 }
 
-fn with_table(body: impl Fn(&Bed<'_>)) {
+pub(super) fn with_table(body: impl Fn(&Bed<'_>)) {
     let new =
         |rig, folder: &std::path::Path| Stage::new(rig, (ROTARY, SEED), folder, few_placements);
     each(new, zeroed(body));
@@ -29,7 +29,7 @@ fn with_table(body: impl Fn(&Bed<'_>)) {
 
 impl Bed<'_> {
     /// Where the motion `request` ends, in degrees.
-    fn turns_to(&self, request: &MoveRequest) -> f64 {
+    pub(super) fn turns_to(&self, request: &MoveRequest) -> f64 {
         let view = self.ended(&self.begin(request));
         assert_eq!(view.state, MotionState::Done, "{view:?}");
         let position = view.axes["c"].position.clone().expect("it is there");
@@ -66,11 +66,14 @@ fn a_turn_is_refused_where_nothing_corrects_it_or_it_is_no_angle_and_a_stop_name
         let refused = bed.refused(&to("c", 12.5), Code::NotOffered);
         assert!(refused.to_string().contains("`targets.c`"), "{refused}");
         let fast = MoveRequest {
-            speed: Some(service::Speed(units::MetresPerSecond(1e-3))),
+            speed: Some(units::MetresPerSecond(1e-3).into()),
             ..turned(10.0)
         };
         let refused = bed.refused(&fast, Code::NotOffered);
-        assert!(refused.to_string().contains("`speed`"), "{refused}");
+        assert!(
+            refused.to_string().contains("`speed`: axis c turns"),
+            "{refused}"
+        );
         let id = bed.begin(&MoveRequest {
             way: Some(WayName::Turns),
             ..turned(3600.0)
@@ -88,6 +91,23 @@ fn a_turn_is_refused_where_nothing_corrects_it_or_it_is_no_angle_and_a_stop_name
         assert_eq!((axis.state, axis.homed), (AxisState::Standstill, true));
         bed.client.power(&anna(), "c", false).unwrap();
         bed.refused(&turned(0.0), Code::AxisDisabled);
+    });
+}
+
+#[test]
+fn a_table_turns_as_slowly_as_it_is_asked_to() {
+    with_table(|bed| {
+        let slow = MoveRequest {
+            speed: Some(RadiansPerSecond(5.0_f64.to_radians()).into()),
+            ..turned(90.0)
+        };
+        let from = bed.encoder_mm("c");
+        let id = bed.begin(&slow);
+        bed.let_time_pass(1.0);
+        // At its usual speed of 30 degrees per second it would be 25 and more.
+        let so_far = bed.encoder_mm("c") - from;
+        assert!((3.0..=6.0).contains(&so_far), "{so_far} degrees in 1 s");
+        assert_eq!(bed.now(&id).state, MotionState::Moving);
     });
 }
 

@@ -4,13 +4,13 @@ use std::time::{Duration, Instant};
 
 use machine::StopRequest;
 use serde_json::{Value, json};
-use units::MetresPerSecond;
 
 use super::{STOP, Service, failed, refuse, stop_request, stopped, tell, words_of};
 use crate::Failure;
 use crate::program::MoveArgs;
 use crate::program::exchange::ask_on;
-use crate::program::jog::{JogArgs, told};
+use crate::program::jog::JogArgs;
+use crate::program::jogs::told;
 use crate::program::output::{Ended, Output};
 use crate::program::targets::AskedMotion;
 
@@ -54,11 +54,7 @@ impl Service {
         refuse(args.machine.record.is_some(), "--record")?;
         let (jog, stop) = (args.jog()?, stop_request()?);
         self.zero_first(Some(&jog.axis), &stop, output)?;
-        let request = |speed: MetresPerSecond| {
-            let mm_per_s = speed.value() * 1e3;
-            json!({"axis": jog.axis, "speed": {"value": mm_per_s, "unit": "mm/s"}})
-        };
-        let id = self.begin("/v1/jog", &request(jog.speed))?;
+        let id = self.begin("/v1/jog", &jog.request())?;
         // By the wall: whoever keeps the machine has its own clock.
         let end = jog.duration.map(|it| Instant::now() + it);
         let is_over = || stop.is_requested() || end.is_some_and(|end| Instant::now() >= end);
@@ -67,7 +63,7 @@ impl Service {
         let is_ours = is_over();
         if is_ours {
             // It may just have ended by itself.
-            let over = request(MetresPerSecond(0.0)).to_string();
+            let over = jog.request_of_its_end().to_string();
             let _ = ask_on(&self.at, "POST", "/v1/jog", &over);
         }
         let motion = ask_on(&self.at, "GET", &format!("{path}?wait_s=10"), "")?;

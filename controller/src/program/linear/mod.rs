@@ -20,6 +20,7 @@ pub(crate) mod verbs;
 
 use machine::records::Log;
 
+use super::jogs::of_linear_axis;
 use super::show::Shown;
 use super::targets::axis_motion;
 use super::text::table_notes;
@@ -46,6 +47,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    jog: of_linear_axis,
     motion: axis_motion,
     asked: &[],
     words: &told::TELLER,

@@ -20,6 +20,7 @@ use std::path::Path;
 use machine::records::{Log, read_journal};
 use report::PlatformPage;
 
+use super::jogs::of_linear_axis;
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
@@ -37,6 +38,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    jog: of_linear_axis,
     motion: target::motion,
     asked: &[],
     words: &told::TELLER,

@@ -45,6 +45,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
+    jog: verbs::jog,
     motion: targets::motion,
     asked: asked::ASKED,
     words: &told::TELLER,

@@ -20,6 +20,7 @@ pub(crate) fn printed() -> Printed {
                 "of rotary axes",
                 [("moves", list(part("rotary-moved")))],
             ),
+            Form::new("jog", "of a rotary axis", jog()).counted(),
             plan(),
             fit(),
             diff(),
@@ -32,6 +33,17 @@ pub(crate) fn printed() -> Printed {
             ("rotary-verified", object(verify())),
         ],
     }
+}
+
+fn jog() -> Vec<Member> {
+    vec![
+        ("axis", text()),
+        ("encoder_deg", number()),
+        (
+            "at_last_count",
+            truth().about("Whether it ended where its drive counts no further."),
+        ),
+    ]
 }
 
 fn maybe() -> Shape {

@@ -2,7 +2,9 @@
 
 use serde_json::{Value, json};
 
+use crate::jogging::{Jogged, round};
 use crate::ports::Use;
+use crate::program::jogs::Jog;
 use crate::program::json as to_json;
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
@@ -182,4 +184,12 @@ fn calibration_of(
     let id = machine.rotary(axis)?.load_active(store)?;
     machine.rotary(axis)?.course().require(axis, agreed)?;
     Ok(id)
+}
+
+pub(crate) fn jog(machine: &mut Machine, _: &Store, jog: &Jog) -> Result<Jogged, Failure> {
+    let speed = round(&jog.axis, jog.speed)?;
+    machine.rotary(&jog.axis)?.check_jog(speed)?;
+    machine.start()?;
+    machine.rotary(&jog.axis)?.zero()?;
+    machine.rotary(&jog.axis)?.jog(speed, jog.duration)
 }

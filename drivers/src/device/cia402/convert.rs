@@ -6,6 +6,9 @@ use wire::canopen::Object;
 use super::settings::Cia402Settings;
 use crate::device::DeviceError;
 
+/// Beyond this a float no longer tells one count from the next.
+pub(super) const EXACT_COUNTS: i64 = 1 << 52;
+
 /// `value` and `limit` in SI units, `unit` what a person reads them in.
 pub(super) fn out_of_range<Q: Coordinate>(
     settings: &Cia402Settings<Q>,
@@ -56,9 +59,7 @@ pub(super) fn position_counts<Q: Coordinate>(
     if settings.turn.is_none() {
         return counts_i32(settings, object, what, position).map(i64::from);
     }
-    // Beyond this a float no longer tells one count from the next.
-    const EXACT: f64 = (1_u64 << 52) as f64;
-    let limit = settings.scale.resolution().abs() * EXACT;
+    let limit = settings.scale.resolution().abs() * EXACT_COUNTS as f64;
     if position.is_finite() && position.abs() <= limit {
         return Ok(settings.scale.to_counts(position).0);
     }

@@ -4,10 +4,12 @@
 //! position of the next sample is taken to be the nearest one that the drive can mean: between
 //! two samples an axis never turns by half a turn.
 
-use units::Coordinate;
+use units::{Approach, Coordinate, Counts, Radians};
 
 use super::Cia402Drive;
+use super::convert::EXACT_COUNTS;
 use super::settings::{Cia402Settings, PositionRange, Turn};
+use crate::device::RotaryAxis;
 
 /// Positions this many counts apart look the same on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +63,38 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             None => position - self.image.wrapped_away(),
         };
         i32::try_from(shown).ok()
+    }
+
+    /// Where the drive's position register ends with growing counts, or with falling ones.
+    pub(super) fn register_end(&self, grows: bool) -> Counts {
+        let end = if grows { i32::MAX } else { i32::MIN };
+        Counts(self.image.wrapped_away() + i64::from(end))
+    }
+
+    /// How far from `here` the axis can be sent, with growing counts or with falling ones.
+    fn counts_left(&self, here: i64, grows: bool) -> i64 {
+        let sign = if grows { 1 } else { -1 };
+        if self.settings.wraps_at().is_some() {
+            return EXACT_COUNTS - sign * here;
+        }
+        // The register must not run over while the axis settles there: it would count on from its other end, and the
+        // way back be closed.
+        let lag = self.settings.following_error.map_or(Q::ZERO, |it| it.0);
+        let margin = self.settings.scale.to_counts(lag).0.abs() + self.settings.tolerance_counts();
+        // Nor may the way be more than 31 bits hold: whether a drive sees it as one the other way round nobody knows.
+        let left = sign * (self.register_end(grows).0 - here);
+        left.min(i32::MAX.into()) - margin
+    }
+}
+
+impl RotaryAxis for Cia402Drive<Radians> {
+    fn last_position(&self, way: Approach) -> Option<Radians> {
+        let here = self.image.sample()?.position.0;
+        let scale = self.settings.scale;
+        let grows = (way == Approach::Forward) == (scale.resolution() > Radians::ZERO);
+        let left = self.counts_left(here, grows).max(0);
+        let last = if grows { here + left } else { here - left };
+        Some(scale.to_coordinate(Counts(last)))
     }
 }
 

@@ -138,7 +138,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let object = TARGET_POSITION.object;
         let counts = position_counts(settings, object, "target", target)?;
         if self.on_the_wire(counts).is_none() {
-            let limit = settings.scale.to_coordinate(self.register_end(counts));
+            let beyond_the_last = counts > self.image.wrapped_away();
+            let limit = settings
+                .scale
+                .to_coordinate(self.register_end(beyond_the_last));
             let range = (target.value(), limit.value());
             return Err(out_of_range(settings, object, "target", range, Q::UNIT));
         }
@@ -165,13 +168,6 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             deadline: Time::NEVER,
             reached: 0,
         })
-    }
-
-    /// Where the drive's position register ends on the way to `target`.
-    fn register_end(&self, target: i64) -> Counts {
-        let away = self.image.wrapped_away();
-        let end = if target > away { i32::MAX } else { i32::MIN };
-        Counts(away + i64::from(end))
     }
 
     /// Where to send the drive now for it to come to `target` in the end. One that wraps takes

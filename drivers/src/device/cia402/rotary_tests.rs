@@ -1,14 +1,15 @@
 //! A rotary axis and its touch probe against a small fake table that wraps or counts on.
 
 use core::time::Duration;
-use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared, Time};
+use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale, Time};
 use wire::canopen::NodeId;
 
 use super::*;
 use crate::device::canopen_node::NodeSettings;
 use crate::device::fake_node::FakeNode;
 use crate::device::{
-    Axis, AxisCommand, DriveCommand, LatchCommand, Latched, PositionLatch, Repeat, ServoDrive,
+    Axis, AxisCommand, DriveCommand, LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis,
+    ServoDrive,
 };
 
 const SYNC_MS: u64 = 2;
@@ -53,6 +54,8 @@ impl FakeTable {
             (0x607B, 2, 4),
             (0x60F2, 0, 2),
             (0x60F4, 0, 4),
+            (0x6065, 0, 4),
+            (0x6066, 0, 2),
             (0x6067, 0, 4),
             (0x6068, 0, 2),
             (0x6081, 0, 4),
@@ -403,6 +406,55 @@ fn a_register_that_is_full_goes_on_in_the_reading_and_refuses_what_lies_beyond_i
     rig.does(to(beyond + 3.0, 100.0)).unwrap();
     assert_eq!(rig.fake.at, end + 800);
     assert_eq!(rig.alarms, []);
+}
+
+#[test]
+fn the_last_position_is_reached_before_the_register_is_full_and_the_way_back_stays_open() {
+    for scale_sign in [1.0, -1.0] {
+        let end = i64::from(i32::MAX);
+        let mut rig = Rig::new(PositionRange::CountsOn, end - 5_000);
+        let mut reversed = settings(PositionRange::CountsOn);
+        reversed.scale = Scale::new(reversed.scale.resolution() * scale_sign).unwrap();
+        reversed.following_error = Some((degrees(2.0), Duration::from_millis(50)));
+        rig.drive = Cia402Drive::new(reversed);
+        let mut rig = Rig::with(rig);
+        let (on, back) = match scale_sign > 0.0 {
+            true => (Approach::Forward, Approach::Reverse),
+            false => (Approach::Reverse, Approach::Forward),
+        };
+        let last = rig.drive.last_position(on).unwrap();
+        rig.does(to(last.degrees(), 100.0)).unwrap();
+        // As far as it may lag, and twice its window.
+        assert_eq!(rig.fake.at, end - 203);
+        // Pushed on a little: there is nowhere to go on to, and no way that leads back.
+        rig.fake.target += 100;
+        rig.tick_ms(100);
+        let here = rig.drive.reading().unwrap().position;
+        assert_eq!(rig.drive.last_position(on), Some(here));
+        let other = rig.drive.last_position(back).unwrap();
+        // No farther than 31 bits of counts: from the other end to this one are 32.
+        assert!((other.degrees().abs() - 1.0).abs() < 1e-6, "{other}");
+        rig.drive.command(rig.now, to(other.degrees(), 100.0));
+        rig.tick_ms(1_000);
+        assert!(rig.fake.at < end - 5_000, "{}", rig.fake.at);
+        assert_eq!(rig.alarms, []);
+    }
+}
+
+#[test]
+fn a_drive_that_wraps_turns_on_and_on() {
+    let mut rig = Rig::enabled(PositionRange::ToLastCount, 0);
+    for (way, sign) in [(Approach::Forward, 1), (Approach::Reverse, -1)] {
+        let last = rig.drive.last_position(way).unwrap().degrees();
+        assert!(last * sign as f64 > 360e9, "{last}");
+        let from = rig.fake.at;
+        rig.drive.command(rig.now, to(last, 300.0));
+        rig.tick_ms(10_000);
+        let turns = (rig.fake.at - from) / TURN * sign;
+        assert!(turns >= 4, "{turns} turns");
+        rig.does(DriveCommand::Halt).unwrap();
+        assert_eq!(rig.alarms, []);
+    }
 }
 
 #[test]

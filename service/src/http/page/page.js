@@ -132,6 +132,10 @@ function card(axis) {
     const [uncompensated, beyond] = [".uncompensated", ".beyond"].map((name) => agreed(made.querySelector(name)));
     told(ask("POST", "/v1/motions", { targets: { [axis.name]: target }, uncompensated, beyond }));
   });
+  if (axis.soft_min === null) {
+    made.querySelector(".go input").placeholder = "90deg";
+    made.querySelector(".speed").value = "5deg/s";
+  }
   for (const button of made.querySelectorAll(".jog")) holdToJog(button, axis.name, made.querySelector(".speed"));
   made.querySelector(".power").addEventListener("click", (event) => {
     told(ask("POST", `/v1/axes/${encodeURIComponent(axis.name)}/${event.target.dataset.verb}`));
@@ -173,6 +177,7 @@ function holdToJog(button, axis, speed) {
     if (held === null) return;
     clearInterval(held);
     held = null;
+    // 0 ends it in any unit.
     Promise.resolve(said).then(() => ask("POST", "/v1/jog", { axis, speed: "0mm/s" })).catch(() => {});
   };
   button.addEventListener("pointerdown", (event) => { button.setPointerCapture(event.pointerId); hold(); });
@@ -198,9 +203,8 @@ function showAxes(list) {
     const at = axis.encoder ? axis.encoder.value : low;
     bar.value = (turns ? ((at % 360) + 360) % 360 : at - low) / (high - low);
     const never = together.has(axis.name);
-    for (const it of shown.querySelectorAll(".jogs")) it.hidden = turns || never;
+    for (const it of shown.querySelectorAll(".jogs")) it.hidden = never;
     shown.querySelector(".go").hidden = never;
-    if (turns) shown.querySelector(".go input").placeholder = "90deg";
     bar.title = turns ? "turns endlessly" : `${low} to ${high} ${axis.soft_min.unit}`;
     const facts = {
       zero: axis.homed ? "found" : "not found yet",

@@ -6,9 +6,9 @@ use machine::Machine;
 use serde_json::json;
 use truestage::Agreed;
 use truestage::rotary::Way;
-use units::{MetresPerSecond, Time};
+use units::{AxisSpeed, Time};
 
-use super::super::seat::{Seat, Task};
+use super::super::seat::Task;
 use super::super::stop::stopped_by;
 use super::super::{Keeper, utc_now};
 use super::going::{Going, Wanted};
@@ -202,11 +202,11 @@ fn dead_man_of(request: &MoveRequest) -> Result<Option<Duration>, Problem> {
     }
 }
 
-fn speed_of(request: &MoveRequest) -> Result<Option<MetresPerSecond>, Problem> {
+fn speed_of(request: &MoveRequest) -> Result<Option<AxisSpeed>, Problem> {
     match request.speed {
         // Written so that NaN is refused too.
         Some(speed) if speed.0.value() > 0.0 => Ok(Some(speed.0)),
-        // One that is written as a positive number may still be none in metres per second.
+        // One that is written as a positive number may still be none in metres or radians per second.
         Some(_) => Err(Problem::new(
             Code::NotOffered,
             "a speed that is not positive",
@@ -214,11 +214,4 @@ fn speed_of(request: &MoveRequest) -> Result<Option<MetresPerSecond>, Problem> {
         )),
         None => Ok(None),
     }
-}
-
-/// That the axis of `seat` is one that turns.
-pub(super) fn not_jogged(seat: &Seat) -> Problem {
-    let what = format!("axis {} turns, and is not jogged", seat.name);
-    let help = "ask for a motion to an angle, or use `truestage move`";
-    Problem::new(Code::NotOffered, what, help)
 }

@@ -5,10 +5,11 @@ use truestage::linear::{Corrected, PlannedMove};
 use truestage::rotary::{PlannedTurn, Way};
 use truestage::runs::Moved;
 use truestage::{Agreed, linear};
-use units::{Metres, MetresPerSecond, Radians};
+use units::{AxisSpeed, Metres, Radians};
 
 use super::super::mechanics::{Linear, Mechanics};
 use super::super::seat::Seat;
+use super::speed;
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
 
@@ -23,7 +24,7 @@ pub(super) enum Going {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
     pub(super) agreed: Agreed,
-    pub(super) speed: Option<MetresPerSecond>,
+    pub(super) speed: Option<AxisSpeed>,
     pub(super) way: Option<Way>,
 }
 
@@ -149,9 +150,9 @@ fn along(
     };
     let mut planned = course.plan(machine, axis, target)?;
     planned.corrected.require(axis, target, agreed)?;
-    planned.speed = wanted
-        .speed
-        .map_or(planned.speed, |it| it.min(planned.speed));
+    if let Some(wanted) = wanted.speed {
+        planned.speed = speed::along(axis, wanted)?.min(planned.speed);
+    }
     Ok(planned)
 }
 
@@ -161,10 +162,6 @@ fn round(
     (angle, wanted): (Radians, Wanted),
 ) -> Result<PlannedTurn, Problem> {
     let axis = &seat.name;
-    if wanted.speed.is_some() {
-        let what = format!("`speed` is that of axes along a way, and axis {axis} turns");
-        return Err(Problem::new(Code::NotOffered, what, "leave it out"));
-    }
     machine
         .require_zeroed(axis)
         .map_err(truestage::Failure::from)?;
@@ -178,5 +175,9 @@ fn round(
     course.require(axis, wanted.agreed)?;
     let here = reading.map_or(Radians::ZERO, |it| it.position);
     let way = wanted.way.unwrap_or(Way::Shortest);
-    Ok(course.plan(axis, here, angle, way)?)
+    let mut planned = course.plan(axis, here, angle, way)?;
+    if let Some(wanted) = wanted.speed {
+        planned.speed = speed::round(axis, wanted)?.min(planned.speed);
+    }
+    Ok(planned)
 }

@@ -3,15 +3,17 @@
 use core::time::Duration;
 
 use machine::Machine;
-use units::MetresPerSecond;
+use truestage::Failure;
+use units::{Approach, AxisSpeed, Radians};
 
 use super::super::Keeper;
+use super::super::mechanics::Mechanics;
+use super::super::seat::Seat;
 use super::super::stop::stopped_by;
-use super::accept::not_jogged;
-use super::{End, Motion, Phase};
+use super::{End, Motion, Phase, speed};
+use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
-use crate::quantity::Speed;
-use crate::request::{JogRequest, MoveRequest};
+use crate::request::{JogRequest, MoveRequest, WayName};
 
 /// A jog that was not renewed for so long stops.
 const DEAD_MAN: Duration = Duration::from_millis(200);
@@ -61,7 +63,7 @@ impl Keeper {
         })
     }
 
-    /// As far as the soft limit on that side, by the encoder.
+    /// As far as the axis goes on that side, by the encoder.
     fn jog_motion(
         &self,
         machine: &Machine,
@@ -70,16 +72,11 @@ impl Keeper {
         request: &JogRequest,
         at: usize,
     ) -> Result<Motion, Problem> {
-        let (settings, _) = self.seats[at]
-            .linear()
-            .ok_or_else(|| not_jogged(&self.seats[at]))?;
         let speed = request.speed.0;
-        let target = match speed.value() > 0.0 {
-            true => settings.soft_max,
-            false => settings.soft_min,
-        };
+        let (target, way) = end_of(machine, &self.seats[at], speed)?;
         let request = MoveRequest {
-            speed: Some(Speed(MetresPerSecond(speed.value().abs()))),
+            speed: Some(speed.abs().into()),
+            way,
             uncompensated: true,
             ..MoveRequest::of(&request.axis, target)
         };
@@ -115,4 +112,34 @@ impl Keeper {
         let stopped = stopped_by(by);
         self.stop_motion(machine, number, End::Stopped(stopped));
     }
+}
+
+/// Where a jog at `wanted` ends when nothing ends it before: at the soft limit, or where the drive of an axis that turns
+/// counts no further.
+fn end_of(
+    machine: &Machine,
+    seat: &Seat,
+    wanted: AxisSpeed,
+) -> Result<(Coordinate, Option<WayName>), Problem> {
+    match &seat.mechanics {
+        Mechanics::Linear(own) => {
+            speed::along(&seat.name, wanted)?;
+            let limit = match wanted.approach() {
+                Approach::Forward => own.settings.soft_max,
+                Approach::Reverse => own.settings.soft_min,
+            };
+            Ok((limit.into(), None))
+        }
+        Mechanics::Turning(_) => {
+            speed::round(&seat.name, wanted)?;
+            let last = last_angle(machine, &seat.name, wanted.approach());
+            Ok((last.map_err(Failure::from)?.into(), Some(WayName::Turns)))
+        }
+    }
+}
+
+fn last_angle(machine: &Machine, axis: &str, way: Approach) -> Result<Radians, machine::Failure> {
+    machine.require_zeroed(axis)?;
+    let last = machine.devices().rotary_last_position(axis, way)?;
+    Ok(last.expect("an axis that was zeroed has been read"))
 }
