@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use machine::{Driving, Machine};
-use units::{AxisSpeed, LengthOrAngle, MetresPerSecond, RadiansPerSecond};
+use machine::{Driving, Machine, STOP_LIMIT};
+use units::{AxisSpeed, MetresPerSecond, RadiansPerSecond};
 
 use crate::failure::Failure;
 
@@ -11,11 +11,12 @@ use crate::failure::Failure;
 const LOOK: Duration = Duration::from_millis(20);
 
 /// How a jog ended.
+#[cfg(feature = "program")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jogged {
     /// Where the axis stands, by its encoder.
-    pub(crate) position: LengthOrAngle,
-    /// Whether it ended where the axis goes no further.
+    pub(crate) position: units::LengthOrAngle,
+    /// Whether it ended by itself: it goes no further.
     pub(crate) is_at_end: bool,
 }
 
@@ -52,6 +53,7 @@ fn other_unit(axis: &str, does: &str, seen: AxisSpeed, expected: &str) -> Failur
 ///
 /// # Errors
 /// When it is.
+#[cfg(feature = "program")]
 pub(crate) fn require_usual(
     axis: &str,
     (speed, usual): (AxisSpeed, AxisSpeed),
@@ -67,25 +69,64 @@ pub(crate) fn require_usual(
     })
 }
 
-/// Lets `axis` run on, for so long at most, to where it has been sent; it stands afterwards. Whether it came there.
+/// Lets `axes` run on, for so long at most, to where they have been sent; they stand afterwards. Whether they came there.
 ///
 /// # Errors
 /// Whatever stops the machine.
 pub(crate) fn run_on(
     machine: &mut Machine,
-    axis: &str,
+    axes: &[&str],
     duration: Option<Duration>,
 ) -> Result<bool, Failure> {
     let end = duration.map(|it| machine.now() + it);
+    let mut under_way = axes.to_vec();
     loop {
         machine.tick(machine.now() + LOOK)?;
-        if let Some(outcome) = Driving::of(machine, axis)?.outcome() {
-            outcome?;
+        under_way = still_under_way(machine, under_way)?;
+        if under_way.is_empty() {
             return Ok(true);
         }
         if end.is_some_and(|end| machine.now() >= end) {
-            Driving::of(machine, axis)?.come_to_rest()?;
+            bring_to_rest(machine, under_way)?;
             return Ok(false);
+        }
+    }
+}
+
+/// Those of `axes` whose command has not ended.
+fn still_under_way<'a>(machine: &mut Machine, axes: Vec<&'a str>) -> Result<Vec<&'a str>, Failure> {
+    let mut under_way = Vec::new();
+    for axis in axes {
+        match Driving::of(machine, axis)?.outcome() {
+            Some(outcome) => outcome?,
+            None => under_way.push(axis),
+        }
+    }
+    Ok(under_way)
+}
+
+/// Slows all of `axes` down at once, and waits until they stand.
+fn bring_to_rest(machine: &mut Machine, mut axes: Vec<&str>) -> Result<(), Failure> {
+    for axis in &axes {
+        Driving::of(machine, axis)?.halt();
+    }
+    let waited = machine.patience().of(STOP_LIMIT);
+    let limit = machine.now() + waited;
+    loop {
+        machine.tick((machine.now() + LOOK).min(limit))?;
+        axes = still_under_way(machine, axes)?;
+        let Some(axis) = axes.first() else {
+            return Ok(());
+        };
+        if machine.now() >= limit {
+            let device = (*axis).to_owned();
+            let step = "halt";
+            return Err(machine::Failure::Overdue {
+                device,
+                step,
+                waited,
+            }
+            .into());
         }
     }
 }

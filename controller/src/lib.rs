@@ -58,7 +58,6 @@ mod groups;
 mod handle;
 mod hardware;
 mod homing;
-#[cfg(feature = "program")]
 mod jogging;
 mod kinds;
 pub mod linear;

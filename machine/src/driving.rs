@@ -4,7 +4,6 @@ use drivers::device::DriveCommand;
 
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::stopping::STOP_LIMIT;
 
 /// The drive of a linear or rotary axis, to be told something by whoever does not wait.
 ///
@@ -37,16 +36,6 @@ impl<'m> Driving<'m> {
             (false, _) => self.give_up(DriveCommand::Halt),
         }
         true
-    }
-
-    /// Slows down and stays enabled, and waits until the axis stands.
-    ///
-    /// # Errors
-    /// When it does not stand in time, or whatever else stops the machine.
-    pub fn come_to_rest(&mut self) -> Result<(), Failure> {
-        self.forget_approach();
-        self.machine
-            .control(self.at, DriveCommand::Halt, "halt", STOP_LIMIT)
     }
 
     /// Stops as fast as the quick stop deceleration allows, then disables.
@@ -82,15 +71,11 @@ impl<'m> Driving<'m> {
     }
 
     fn give_up(&mut self, command: DriveCommand) {
-        self.forget_approach();
-        self.control(command);
-    }
-
-    fn forget_approach(&mut self) {
         // Of rotary axes nobody remembers it.
         if let Some(approach) = self.machine.approach.get_mut(self.at) {
             approach.forget();
         }
+        self.control(command);
     }
 
     fn control(&mut self, command: DriveCommand) {

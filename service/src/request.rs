@@ -124,7 +124,7 @@ impl From<WayName> for Way {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JogRequest {
-    /// Which axis.
+    /// Which axis, or which part of where a platform is: x, y or theta.
     pub axis: String,
     /// How fast, and with its sign which way; 0, in any unit, ends the jog. At most the usual speed of its
     /// configuration. An angular speed (`5deg/s`) of an axis that turns.

@@ -2,7 +2,7 @@
 
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
-use tests::{ROTARY, Shipped};
+use tests::{ROTARY, Shipped, UVW};
 
 use crate::held::Brake;
 use crate::programs::{Bench, live_rigs, number};
@@ -131,4 +131,27 @@ fn check_kept(shipped: Shipped, jog: &str, refused: &[(&str, &str)]) {
 fn a_kept_table_is_jogged_as_one_without_a_service_is() {
     let refused = [("c=2mm/s", "axis c turns"), ("q=2deg/s", "q")];
     check_kept(ROTARY, "c=-20deg/s", &refused);
+}
+
+#[test]
+fn a_platform_is_jogged_for_a_time_and_to_the_end_of_its_reach_kept_or_not() {
+    for rig in live_rigs() {
+        let bench = Bench::of(rig, UVW, |text| text);
+        let jogged = bench.run(&["jog", "machine.toml", "x=0.5mm/s", "--for", "1s"]);
+        let jogged = jogged.with_code(0);
+        let stands = number(&jogged["encoder_mm"]);
+        assert!((0.4..=0.55).contains(&stands), "{jogged}");
+        assert_eq!(jogged["at_end_of_reach"], false, "{jogged}");
+        let jogged = bench.run(&["jog", "machine.toml", "theta=-0.5deg/s"]);
+        let jogged = jogged.with_code(0);
+        let stands = number(&jogged["encoder_deg"]);
+        assert!((stands + 0.5).abs() < 0.001, "{jogged}");
+        assert_eq!(jogged["at_end_of_reach"], true, "{jogged}");
+    }
+    let refused = [
+        ("x=2deg/s", "goes along a way"),
+        ("theta=1mm/s", "axis theta turns"),
+        ("z=1mm/s", "z"),
+    ];
+    check_kept(UVW, "y=-0.5mm/s", &refused);
 }

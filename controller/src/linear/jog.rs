@@ -34,7 +34,7 @@ impl LinearStage<'_> {
             Approach::Reverse => settings.soft_min,
         };
         Moving::of(self.core.machine, self.axis)?.begin(limit, speed.abs())?;
-        let is_at_end = run_on(self.core.machine, self.axis, duration)?;
+        let is_at_end = run_on(self.core.machine, &[self.axis], duration)?;
         self.core.forget_approach(self.axis)?;
         let reading = self.core.reading(self.axis)?;
         Ok(Jogged {

@@ -19,6 +19,7 @@ mod failure;
 mod golden;
 mod handle;
 mod header;
+mod jog;
 mod kind;
 mod log;
 mod look;
@@ -50,6 +51,8 @@ pub(crate) use config::{
     AlignConfig, LostMotionRule, PlatformCalibrateConfig, PlatformConfig, ScrewCompensationConfig,
 };
 pub(crate) use entries::{ArrangementEntry, PoseEntry, PoseRecord, StrokeEntry};
+#[cfg(feature = "program")]
+pub(crate) use jog::PoseJog;
 pub(crate) use kind::KIND;
 pub(crate) use log::PlatformEntry;
 #[cfg(feature = "program")]

@@ -3,16 +3,18 @@
 
 use compensator::platform::{Platform, Pose};
 use machine::records::Store;
+use units::{AxisSpeed, Metres};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::platform::PlatformConfig;
 use crate::platform::handle::AlignmentPlatform;
+use crate::platform::jog::{PoseJog, Reach, margin, standing};
 use crate::platform::look::SeenPose;
 use crate::platform::moves::{PoseMoved, check_pose_of};
-use crate::platform::target::NamedPose;
+use crate::platform::target::{NamedPose, places};
 use crate::platform::verify::{Aligned, alignment};
-use crate::runs::GroupMove;
+use crate::runs::{GroupMove, Judging, Place};
 
 /// A move that is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -58,8 +60,43 @@ pub struct PlatformMoved {
 pub(super) struct PlatformCourse {
     config: PlatformConfig,
     kinematics: Platform,
+    /// So far short of the ends of its reach a jog stays.
+    margin: Metres,
     /// The screws that have no calibration.
     without: Vec<String>,
+}
+
+impl Judging for PlatformCourse {
+    fn judge(&self, _: &machine::Machine, asked: &GroupMove) -> Result<(), Failure> {
+        match asked.jog {
+            // It goes as far as it can.
+            Some(_) => Ok(()),
+            None => self.check(&PoseAsked::of(asked)),
+        }
+    }
+
+    fn end_of_jog(
+        &self,
+        machine: &machine::Machine,
+        part: &str,
+        speed: AxisSpeed,
+    ) -> Result<Option<Place>, Failure> {
+        let jog = PoseJog::new(part, speed)?;
+        let reach = Reach {
+            config: &self.config,
+            kinematics: &self.kinematics,
+            margin: self.margin,
+        };
+        let from = standing(&self.kinematics, machine)?;
+        Ok(Some(jog.place(reach.end_of(jog, from))))
+    }
+
+    fn standing(&self, machine: &machine::Machine) -> Result<Vec<(String, Place)>, Failure> {
+        let pose = standing(&self.kinematics, machine)?;
+        Ok(places(pose)
+            .map(|(name, place)| (name.to_owned(), place))
+            .to_vec())
+    }
 }
 
 impl PlatformCourse {
@@ -92,6 +129,7 @@ impl AlignmentPlatform<'_> {
         PlatformCourse {
             config: self.config.clone(),
             kinematics: self.state.kinematics.clone(),
+            margin: margin(self.config, self.core.config),
             without,
         }
     }

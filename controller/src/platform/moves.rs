@@ -44,10 +44,10 @@ impl PoseMoved {
 
 /// What one screw is to do.
 #[derive(Clone, Copy, Debug)]
-struct Planned {
+pub(super) struct Planned {
     set_point: Metres,
-    travel: Metres,
-    after: ScrewMemory,
+    pub(super) travel: Metres,
+    pub(super) after: ScrewMemory,
     standard_uncertainty: Option<Metres>,
 }
 
@@ -140,11 +140,9 @@ impl AlignmentPlatform<'_> {
     fn go(&mut self, planned: &[Planned]) -> Result<PoseMoved, Failure> {
         let target = self.state.pose.unwrap_or_default();
         let skew = self.launch(planned)?;
+        self.remember(planned);
         let state = &mut *self.state;
         state.pose = None;
-        for (screw, planned) in state.screws.iter_mut().zip(planned) {
-            screw.memory = Some(planned.after);
-        }
         let names = state.screws.iter().map(|screw| screw.axis.clone());
         Ok(PoseMoved {
             target,
@@ -155,7 +153,18 @@ impl AlignmentPlatform<'_> {
         })
     }
 
-    fn plan(&self, strokes: &[Metres], correction: Correction) -> Result<Vec<Planned>, Failure> {
+    /// The screws stand as `planned`.
+    pub(super) fn remember(&mut self, planned: &[Planned]) {
+        for (screw, planned) in self.state.screws.iter_mut().zip(planned) {
+            screw.memory = Some(planned.after);
+        }
+    }
+
+    pub(super) fn plan(
+        &self,
+        strokes: &[Metres],
+        correction: Correction,
+    ) -> Result<Vec<Planned>, Failure> {
         let state = &self.state;
         let lost_motion_max = self.lost_motion_max()?;
         let mut planned = Vec::new();
@@ -210,19 +219,35 @@ impl AlignmentPlatform<'_> {
     /// Prepares every screw that has to travel, then starts all of them together; their speeds
     /// are such that they arrive together too.
     fn launch(&mut self, planned: &[Planned]) -> Result<Option<Duration>, Failure> {
+        let speed = MetresPerSecond(self.config.speed_mm_per_s * 1e-3);
+        let settle = Duration::from_millis(self.config.settle_ms.into());
+        let moving = self.prepare(planned, speed)?;
+        if moving.is_empty() {
+            return Ok(None);
+        }
+        self.start_together(&moving)?;
+        let skew = self.start_skew(&moving)?;
+        for (axis, _) in &moving {
+            self.core.stand_still(axis, settle)?;
+        }
+        Ok(skew)
+    }
+
+    /// Prepares every screw that has to travel, the one with the longest way at `speed`, and says which these are:
+    /// their names and numbers.
+    pub(super) fn prepare(
+        &mut self,
+        planned: &[Planned],
+        speed: MetresPerSecond,
+    ) -> Result<Vec<(String, usize)>, Failure> {
         let longest = planned
             .iter()
             .map(|it| it.travel.abs())
             .fold(Metres::ZERO, Metres::max);
         if longest < TRAVEL_MIN {
-            return Ok(None);
+            return Ok(Vec::new());
         }
-        let config = self.config;
-        let (speed, acceleration, settle) = (
-            MetresPerSecond(config.speed_mm_per_s * 1e-3),
-            MetresPerSecondSquared(config.acceleration_mm_per_s2 * 1e-3),
-            Duration::from_millis(config.settle_ms.into()),
-        );
+        let acceleration = MetresPerSecondSquared(self.config.acceleration_mm_per_s2 * 1e-3);
         let moving = self.moving_axes(planned)?;
         self.state.interrupted_before_it_ends();
         for (axis, at) in &moving {
@@ -236,12 +261,7 @@ impl AlignmentPlatform<'_> {
             let limit = self.move_limit(axis)?;
             self.core.command(axis, command, "prepare", limit)?;
         }
-        self.start_together(&moving)?;
-        let skew = self.start_skew(&moving)?;
-        for (axis, _) in &moving {
-            self.core.stand_still(axis, settle)?;
-        }
-        Ok(skew)
+        Ok(moving)
     }
 
     fn moving_axes(&self, planned: &[Planned]) -> Result<Vec<(String, usize)>, Failure> {
@@ -264,7 +284,7 @@ impl AlignmentPlatform<'_> {
     /// Right after a sample there is the most time until the next SYNC: what is sent now
     /// reaches all drives before it. A sample that was read late is no such moment. On a line
     /// without SYNC there is nothing to wait for.
-    fn await_next_sample(&mut self, axis: &str) -> Result<(), Failure> {
+    pub(super) fn await_next_sample(&mut self, axis: &str) -> Result<(), Failure> {
         let Some(period) = self.sync_period(axis)? else {
             return Ok(());
         };

@@ -4,7 +4,7 @@ use compensator::platform::Pose;
 use units::{Metres, Radians};
 
 use crate::platform::config::PARTS;
-use crate::runs::{GroupMove, Part};
+use crate::runs::{GroupMove, Part, Place};
 
 /// The same, with what each is.
 pub(super) fn parts() -> Vec<Part> {
@@ -13,6 +13,16 @@ pub(super) fn parts() -> Vec<Part> {
         ..Part::of_length(name)
     };
     PARTS.map(part).to_vec()
+}
+
+/// Each part of `pose` by its name.
+pub(super) fn places(pose: Pose) -> [(&'static str, Place); 3] {
+    let [x, y, theta] = PARTS;
+    [
+        (x, Place::Length(pose.x)),
+        (y, Place::Length(pose.y)),
+        (theta, Place::Angle(pose.angle)),
+    ]
 }
 
 /// A pose of which not every part need be named.

@@ -7,9 +7,8 @@ use clap::Args;
 use units::AxisSpeed;
 use units::text::axis_speed;
 
-use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::jogs::{Jog, text, value};
+use crate::program::jogs::Jog;
 use crate::program::json::counters;
 use crate::program::kind::by_kind;
 use crate::program::output::{Ended, Output, with_counters};
@@ -22,7 +21,8 @@ use crate::{Failure, Machine};
 pub(crate) struct JogArgs {
     #[command(flatten)]
     pub(crate) machine: MachineArgs,
-    /// How fast, and with its sign which way: `x=2mm/s`, `x=-500um/s`, `c=5deg/s`; at most the usual speed of the axis.
+    /// How fast, and with its sign which way: `x=2mm/s`, `x=-500um/s`, `c=5deg/s`; at most the usual speed of the axis. Of
+    /// a platform x, y or theta.
     #[arg(value_name = "AXIS=SPEED")]
     target: Option<String>,
     /// End after so long: `2s`, `1.5min`; without it, at the soft limit (of an axis that turns, where its drive counts no
@@ -70,15 +70,15 @@ fn speed_of_axis(text: &str) -> Result<(String, AxisSpeed), Failure> {
 pub(crate) fn run(args: &JogArgs, output: Output) -> Ended {
     let jog = args.jog()?;
     by_kind(&args.machine, [jog.axis.as_str()].into_iter(), |kind| {
-        let mut session = Session::open(&args.machine, "jog", Use::Motion, output)?;
+        let mut session = Session::open(&args.machine, "jog", kind.jog.purpose, output)?;
         let store = session.store.clone();
         let (jogged, counters) = session.machine.guarded(|machine: &mut Machine| {
-            let jogged = (kind.jog)(machine, &store, &jog)?;
+            let jogged = (kind.jog.run)(machine, &store, &jog)?;
             machine.shut_down()?;
             Ok((jogged, counters(&machine.devices().counters())))
         })?;
-        let value = with_counters(value(&jog.axis, &jogged), counters);
-        output.result(&text(&jog.axis, &jogged), &value)
+        let value = with_counters(kind.jog.value(&jog.axis, &jogged), counters);
+        output.result(&kind.jog.text(&jog.axis, &jogged), &value)
     })
 }
 

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use units::{AxisSpeed, LengthOrAngle, Metres, Radians};
 
 use crate::jogging::{Jogged, along};
+use crate::ports::Use;
 use crate::{Failure, Machine};
 
 /// What was asked for.
@@ -35,12 +36,7 @@ impl Jog {
     }
 }
 
-/// Jogs a linear axis, whatever else its machine is: starts the machine, finds the zero, and runs.
-pub(crate) fn of_linear_axis(
-    machine: &mut Machine,
-    store: &Store,
-    jog: &Jog,
-) -> Result<Jogged, Failure> {
+fn of_linear_axis(machine: &mut Machine, store: &Store, jog: &Jog) -> Result<Jogged, Failure> {
     let speed = along(&jog.axis, jog.speed)?;
     machine.linear(&jog.axis)?.check_jog(speed)?;
     machine.start()?;
@@ -48,45 +44,60 @@ pub(crate) fn of_linear_axis(
     machine.linear(&jog.axis)?.jog(speed, jog.duration)
 }
 
-pub(crate) fn text(axis: &str, jogged: &Jogged) -> String {
-    let end = match (jogged.is_at_end, jogged.position) {
-        (false, _) => "",
-        (true, LengthOrAngle::Length(_)) => ", at its soft limit",
-        (true, LengthOrAngle::Angle(_)) => ", where its drive counts no further",
-    };
-    format!(
-        "axis {axis} stands at {:.6} by its encoder{end}",
-        jogged.position
-    )
+/// How a kind jogs.
+pub(crate) struct Jogs {
+    /// Starts the machine, finds the zero, and jogs. What makes no sense is refused before.
+    pub(crate) run: fn(&mut Machine, &Store, &Jog) -> Result<Jogged, Failure>,
+    /// What the machine is opened for: what the zero needs.
+    pub(crate) purpose: Use,
+    /// What has to have its zero, where that is not the axis by itself.
+    pub(crate) zeroed: Option<&'static str>,
+    /// What says where it stands.
+    pub(crate) by: &'static str,
+    /// Where a jog ends by itself, and how that is called in what is printed for programs.
+    pub(crate) end: (&'static str, &'static str),
 }
 
-pub(crate) fn value(axis: &str, jogged: &Jogged) -> Value {
-    match jogged.position {
-        LengthOrAngle::Length(it) => json!({
-            "axis": axis,
-            "encoder_mm": it.mm(),
-            "at_soft_limit": jogged.is_at_end,
-        }),
-        LengthOrAngle::Angle(it) => json!({
-            "axis": axis,
-            "encoder_deg": it.degrees(),
-            "at_last_count": jogged.is_at_end,
-        }),
+impl Jogs {
+    /// Of a linear axis, whatever else its machine is.
+    pub(crate) const OF_A_LINEAR_AXIS: Self = Self {
+        run: of_linear_axis,
+        purpose: Use::Motion,
+        zeroed: None,
+        by: "its encoder",
+        end: ("at its soft limit", "at_soft_limit"),
+    };
+
+    pub(crate) fn text(&self, axis: &str, jogged: &Jogged) -> String {
+        let end = match jogged.is_at_end {
+            true => format!(", {}", self.end.0),
+            false => String::new(),
+        };
+        let (at, by) = (jogged.position, self.by);
+        format!("axis {axis} stands at {at:.6} by {by}{end}")
     }
-}
 
-/// What is said of a jog that a service did; `motion` is its end.
-pub(crate) fn told(axis: &str, motion: &Value) -> Option<(String, Value)> {
-    let encoder = &motion["axes"][axis]["encoder"];
-    let stands = encoder["value"].as_f64()?;
-    let jogged = Jogged {
-        position: match encoder["unit"].as_str()? {
-            "deg" => Radians::from_degrees(stands).into(),
-            _ => Metres::from_mm(stands).into(),
-        },
-        is_at_end: motion["state"] == "done",
-    };
-    Some((text(axis, &jogged), value(axis, &jogged)))
+    pub(crate) fn value(&self, axis: &str, jogged: &Jogged) -> Value {
+        let (unit, at) = match jogged.position {
+            LengthOrAngle::Length(it) => ("encoder_mm", it.mm()),
+            LengthOrAngle::Angle(it) => ("encoder_deg", it.degrees()),
+        };
+        json!({"axis": axis, unit: at, self.end.1: jogged.is_at_end})
+    }
+
+    /// What is said of a jog that a service did; `motion` is its end.
+    pub(crate) fn told(&self, axis: &str, motion: &Value) -> Option<(String, Value)> {
+        let encoder = &motion["axes"][axis]["encoder"];
+        let stands = encoder["value"].as_f64()?;
+        let jogged = Jogged {
+            position: match encoder["unit"].as_str()? {
+                "deg" => Radians::from_degrees(stands).into(),
+                _ => Metres::from_mm(stands).into(),
+            },
+            is_at_end: motion["state"] == "done",
+        };
+        Some((self.text(axis, &jogged), self.value(axis, &jogged)))
+    }
 }
 
 #[cfg(test)]
@@ -97,7 +108,11 @@ mod tests {
     fn a_service_that_jogged_a_table_is_told_of_in_degrees() {
         let motion =
             json!({"state": "done", "axes": {"c": {"encoder": {"value": 370.5, "unit": "deg"}}}});
-        let (text, value) = told("c", &motion).unwrap();
+        let table = Jogs {
+            end: ("at its end", "at_last_count"),
+            ..Jogs::OF_A_LINEAR_AXIS
+        };
+        let (text, value) = table.told("c", &motion).unwrap();
         assert!(text.contains("370.5000000°"), "{text}");
         assert_eq!(value["at_last_count"], true, "{value}");
         assert!((value["encoder_deg"].as_f64().unwrap() - 370.5).abs() < 1e-9);

@@ -22,8 +22,19 @@ pub(crate) fn by_kind<'a>(
     named: impl Iterator<Item = &'a str>,
     verb: impl FnOnce(&Verbs) -> Ended,
 ) -> Ended {
+    verb(kind_of_axes(machine, named)?)
+}
+
+/// What the axes `named` are, or the only kind that there is.
+///
+/// # Errors
+/// When the configuration cannot be read, or they are of several kinds.
+pub(crate) fn kind_of_axes<'a>(
+    machine: &MachineArgs,
+    named: impl Iterator<Item = &'a str>,
+) -> Result<&'static Verbs, Failure> {
     let named: Vec<&str> = named.collect();
-    verb(kind_of(&config::load(&machine.config)?.config, &named)?)
+    kind_of(&config::load(&machine.config)?.config, &named)
 }
 
 fn kind_of(config: &MachineConfig, named: &[&str]) -> Result<&'static Verbs, Failure> {

@@ -119,7 +119,7 @@ enum Command {
     /// Zero, then a compensated move: `truestage move machine.toml x=12.5mm`.
     Move(MoveArgs),
     /// Zero, then run an axis at a speed, to its soft limit, for a time, or until Ctrl-C: `truestage jog x=2mm/s`,
-    /// `truestage jog c=5deg/s`.
+    /// `truestage jog c=5deg/s`; or a platform along x or y, or by theta.
     Jog(jog::JogArgs),
     /// Zero, then record the references of the detectors of three axes, for the calibration in use; or take them
     /// from a file (`reference import`).

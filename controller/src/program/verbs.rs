@@ -7,17 +7,16 @@ use machine::records::Store;
 use super::answering::Asked;
 use super::demo::stand::Demo;
 use super::intended::{Intent, Step};
-use super::jogs::Jog;
+use super::jogs::Jogs;
 use super::output::{Ended, Output};
 use super::page::compare::Comparison;
 use super::schema::form::Printed;
 use super::show::Shown;
 use super::targets::AskedMotion;
 use super::{AxisArgs, CalibrateArgs, MoveArgs, VerifyArgs};
+use crate::Failure;
 use crate::config::{Loaded, MachineConfig};
-use crate::jogging::Jogged;
 use crate::runs::Words;
-use crate::{Failure, Machine};
 
 /// The verbs of one kind: those of the cycle, and how what they leave is shown.
 pub(crate) struct Verbs {
@@ -35,8 +34,7 @@ pub(crate) struct Verbs {
     pub(crate) calibrate: fn(&CalibrateArgs, Output) -> Ended,
     pub(crate) verify: fn(&VerifyArgs, Output) -> Ended,
     pub(crate) move_to: fn(&MoveArgs, Output) -> Ended,
-    /// Starts the machine, finds the zero, and jogs. What makes no sense is refused before.
-    pub(crate) jog: fn(&mut Machine, &Store, &Jog) -> Result<Jogged, Failure>,
+    pub(crate) jog: Jogs,
     /// A move as a service is asked for it.
     pub(crate) motion: fn(&MoveArgs) -> Result<AskedMotion, Failure>,
     /// What a person is asked by its runs, when a service does them.

@@ -33,7 +33,7 @@ impl RotaryTable<'_> {
         let last = last.expect("an axis that was zeroed has been read");
         let command = self.move_command(last, speed.abs());
         self.core.turning(self.axis)?.begin(command)?;
-        let is_at_end = run_on(self.core.machine, self.axis, duration)?;
+        let is_at_end = run_on(self.core.machine, &[self.axis], duration)?;
         Ok(Jogged {
             position: self.reading()?.into(),
             is_at_end,

@@ -29,4 +29,4 @@ pub(crate) use group::GroupRuns;
 pub(crate) use task::Work;
 #[cfg(feature = "program")]
 pub(crate) use teller::Words;
-pub(crate) use together::{GroupMoves, NotMoved};
+pub(crate) use together::{GroupMoves, Judging, NotMoved};

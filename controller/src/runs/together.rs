@@ -3,7 +3,7 @@
 use core::fmt;
 
 use machine::records::Store;
-use units::{Metres, Radians};
+use units::{AxisSpeed, Metres, Radians};
 
 use super::teller::{Teller, Told};
 use crate::agreed::Agreed;
@@ -47,6 +47,9 @@ pub struct GroupMove {
     pub agreed: Agreed,
     /// Go on moving until what sees the body sees it there.
     pub align: bool,
+    /// Runs on towards its only target at this speed, which says with its sign which way, until somebody stops it: a
+    /// jog, by the encoders alone.
+    pub jog: Option<AxisSpeed>,
 }
 
 impl GroupMove {
@@ -113,15 +116,43 @@ impl From<Failure> for NotMoved {
     }
 }
 
-type Judging = dyn Fn(&machine::Machine, &GroupMove) -> Result<(), Failure>;
+/// What a kind can tell of its moves without asking a device.
+pub(crate) trait Judging {
+    fn judge(&self, machine: &machine::Machine, asked: &GroupMove) -> Result<(), Failure>;
+
+    /// Where a jog of `part` ends by itself; `None` where none is offered.
+    fn end_of_jog(
+        &self,
+        _machine: &machine::Machine,
+        _part: &str,
+        _speed: AxisSpeed,
+    ) -> Result<Option<Place>, Failure> {
+        Ok(None)
+    }
+
+    /// Where the encoders have each part that is not an axis by itself.
+    fn standing(&self, _machine: &machine::Machine) -> Result<Vec<(String, Place)>, Failure> {
+        Ok(Vec::new())
+    }
+}
+
+impl<F: Fn(&machine::Machine, &GroupMove) -> Result<(), Failure>> Judging for F {
+    fn judge(&self, machine: &machine::Machine, asked: &GroupMove) -> Result<(), Failure> {
+        self(machine, asked)
+    }
+}
 
 /// Says of a move of a group whether it can be made, as far as that can be told without asking a device.
-pub struct Judge(Box<Judging>);
+pub struct Judge(Box<dyn Judging>);
 
 impl Judge {
     pub(crate) fn new(
         judging: impl Fn(&machine::Machine, &GroupMove) -> Result<(), Failure> + 'static,
     ) -> Self {
+        Self::by(judging)
+    }
+
+    pub(crate) fn by(judging: impl Judging + 'static) -> Self {
         Self(Box::new(judging))
     }
 
@@ -130,7 +161,28 @@ impl Judge {
     /// # Errors
     /// Why not.
     pub fn judge(&self, machine: &machine::Machine, asked: &GroupMove) -> Result<(), Failure> {
-        (self.0)(machine, asked)
+        self.0.judge(machine, asked)
+    }
+
+    /// Where a jog of `part` at `speed` ends when nobody stops it; `None` where the group is not jogged as one.
+    ///
+    /// # Errors
+    /// When there is no such part, or it does not move in what `speed` says.
+    pub fn end_of_jog(
+        &self,
+        machine: &machine::Machine,
+        part: &str,
+        speed: AxisSpeed,
+    ) -> Result<Option<Place>, Failure> {
+        self.0.end_of_jog(machine, part, speed)
+    }
+
+    /// Where the encoders have each part that is not an axis by itself.
+    ///
+    /// # Errors
+    /// When they are nowhere.
+    pub fn standing(&self, machine: &machine::Machine) -> Result<Vec<(String, Place)>, Failure> {
+        self.0.standing(machine)
     }
 }
 

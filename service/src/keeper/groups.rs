@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use machine::Stage;
 use truestage::Machine;
-use truestage::runs::{Group, GroupMove, Judge};
+use truestage::runs::{Group, GroupMove, Judge, Place};
+use units::AxisSpeed;
 
 use super::Keeper;
 use super::setup::{Plans, Warmth, plans, resumed};
@@ -36,18 +37,35 @@ impl Grouped {
         machine: &machine::Machine,
         asked: &GroupMove,
     ) -> Result<(), Problem> {
-        match &self.judge {
-            Some(Ok(judge)) => Ok(judge.judge(machine, asked)?),
-            Some(Err(problem)) => Err(problem.clone()),
-            None => {
-                let what = format!("{} is not moved as one", self.group.name);
-                Err(Problem::new(
-                    Code::NotOffered,
-                    what,
-                    "move its axes by themselves",
-                ))
-            }
-        }
+        Ok(self.judged_by()?.judge(machine, asked)?)
+    }
+
+    /// Where a jog of `part` at `speed` ends when nobody stops it.
+    pub(super) fn end_of_jog(
+        &self,
+        machine: &machine::Machine,
+        part: &str,
+        speed: AxisSpeed,
+    ) -> Result<Place, Problem> {
+        let end = self.judged_by()?.end_of_jog(machine, part, speed)?;
+        end.ok_or_else(|| self.not_as_one("jogged"))
+    }
+
+    /// Where the encoders have each part that is not an axis by itself.
+    pub(super) fn standing(&self, machine: &machine::Machine) -> Vec<(String, Place)> {
+        let standing = self.judged_by().ok().map(|it| it.standing(machine));
+        standing.and_then(Result::ok).unwrap_or_default()
+    }
+
+    fn judged_by(&self) -> Result<&Judge, Problem> {
+        let judge = self.judge.as_ref();
+        let judge = judge.ok_or_else(|| self.not_as_one("moved"))?;
+        judge.as_ref().map_err(Clone::clone)
+    }
+
+    fn not_as_one(&self, done: &str) -> Problem {
+        let what = format!("{} is not {done} as one", self.group.name);
+        Problem::new(Code::NotOffered, what, "move its axes by themselves")
     }
 }
 

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use machine::{Failure, Machine};
 use serde_json::json;
 use truestage::linear::Corrected;
-use units::{AxisSpeed, Time};
+use units::Time;
 
 use self::going::{Going, Wanted};
 use self::together::Together;
@@ -23,6 +23,7 @@ use super::seat::{Seat, Task};
 use super::stop::{cause_of, stopped_by};
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
+use crate::request::JogRequest;
 use crate::view::{Cause, MotionView, Stopped};
 
 /// So many that have ended are kept in the snapshot.
@@ -100,8 +101,8 @@ pub(super) struct Motion {
     accepted: String,
     wanted: Wanted,
     dead_man: Option<(Duration, Time)>,
-    /// The speed of a jog, with its sign; a jog has no target and no time in which it has to be anywhere.
-    jog: Option<AxisSpeed>,
+    /// Whose jog it is, and how fast; a jog has no target and no time in which it has to be anywhere.
+    jog: Option<JogRequest>,
     legs: Vec<Leg>,
     /// Its axes move as one: then it has no legs.
     together: Option<Together>,
@@ -390,7 +391,7 @@ impl Keeper {
         }
         let view = Arc::new(shown::ended(
             &motion,
-            &self.seats,
+            (&self.seats, &self.groups),
             machine,
             self.teller.as_ref(),
             end,

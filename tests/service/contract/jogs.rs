@@ -2,10 +2,11 @@
 
 use core::time::Duration;
 
-use service::{AxisState, Code, JogRequest, MotionState, MoveRequest, StopMode, WayName};
+use service::{AxisState, Code, JogRequest, MotionState, MoveRequest, Speed, StopMode, WayName};
 use tests::{Edit, ROTARY};
-use units::{MetresPerSecond, RadiansPerSecond};
+use units::{AxisSpeed, MetresPerSecond, Radians, RadiansPerSecond};
 
+use super::together::with_platform;
 use super::turns::{turned, with_table};
 use super::{Bed, SEED, anna, bert, each_here, slowly, to, with_stage, with_zeroed_stage, zeroed};
 use crate::stage::Stage;
@@ -25,6 +26,22 @@ fn turning(deg_per_s: f64) -> JogRequest {
         axis: "c".into(),
         speed: RadiansPerSecond(deg_per_s.to_radians()).into(),
     }
+}
+
+/// Of a platform.
+fn part(name: &str, speed: impl Into<AxisSpeed>) -> JogRequest {
+    JogRequest {
+        axis: name.into(),
+        speed: Speed::from(speed),
+    }
+}
+
+const fn mm_per_s(speed: f64) -> MetresPerSecond {
+    MetresPerSecond(speed * 1e-3)
+}
+
+const fn arcsec_per_s(speed: f64) -> RadiansPerSecond {
+    RadiansPerSecond(Radians::from_arcsec(speed).value())
 }
 
 impl Bed<'_> {
@@ -241,4 +258,122 @@ fn a_table_whose_drive_counts_on_is_jogged_to_its_last_count_and_back() {
         assert!((20.0..90.0).contains(&back), "{back}");
     };
     each_here(new, zeroed(body));
+}
+
+#[test]
+fn a_platform_is_jogged_along_and_turned_as_long_as_that_is_renewed() {
+    with_platform(|bed| {
+        let from = bed.screws_mm();
+        let moved = || {
+            let to = bed.screws_mm();
+            [0, 1, 2].map(|at| to[at] - from[at])
+        };
+        let id = bed.keeps_jogging(&part("x", mm_per_s(0.5)), 1.5);
+        for screw in ["u", "v"] {
+            let state = bed.client.axis(screw).unwrap().state;
+            assert_eq!(state, AxisState::ContinuousMotion, "{screw}");
+        }
+        assert_eq!(bed.now(&id).state, MotionState::Moving);
+        bed.lets_go();
+        let view = bed.ended(&id);
+        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
+        assert_eq!(view.stopped.clone().unwrap().by, "the dead-man of anna");
+        let [u, v, w] = moved();
+        assert!((0.4..=0.95).contains(&u), "{u} mm in 1.5 s, and 0.2 s more");
+        assert!((u - v).abs() < 0.01 && w.abs() < 0.002, "{u}, {v}, {w} mm");
+        let stands = view.axes["x"].encoder.clone().expect("it is known");
+        assert!((stands.value - u).abs() < 0.01, "{view:?}");
+
+        // The other way, from rest, and about its middle.
+        let first = bed.keeps_jogging(&part("theta", arcsec_per_s(300.0)), 1.0);
+        let back = bed.keeps_jogging(&part("theta", arcsec_per_s(-300.0)), 2.0);
+        assert_ne!(first, back);
+        assert_eq!(bed.jogs(&part("x", mm_per_s(0.0))), back);
+        bed.lets_go();
+        assert_eq!(bed.ended(&first).state, MotionState::Stopped);
+        let view = bed.ended(&back);
+        assert_eq!(view.stopped.clone().unwrap().by, "anna");
+        let turned = view.axes["theta"].encoder.clone().expect("it is known");
+        assert_eq!(turned.unit, "deg");
+        assert!(
+            (-700.0..=-20.0).contains(&(turned.value * 3600.0)),
+            "{view:?}"
+        );
+        let [u_now, v_now, _] = moved();
+        assert!(
+            ((u_now - u) + (v_now - v)).abs() < 0.02,
+            "it turns where it is"
+        );
+        assert_eq!(
+            bed.client.axis("w").unwrap().state,
+            AxisState::Standstill,
+            "it stays enabled"
+        );
+    });
+}
+
+#[test]
+fn a_jog_of_a_platform_ends_at_the_end_of_its_reach_from_which_it_goes_back() {
+    with_platform(|bed| {
+        let ends = |request: &JogRequest, seconds: f64| {
+            let id = bed.keeps_jogging(request, seconds);
+            bed.lets_go();
+            let view = bed.ended(&id);
+            let at = view.axes[&request.axis].encoder.clone();
+            (view.state, at.expect("it is known").value)
+        };
+        let on = part("x", mm_per_s(20.0));
+        for _ in 0..2 {
+            let (state, x) = ends(&on, 1.0);
+            assert_eq!(state, MotionState::Done);
+            assert!((1.4995..=1.5).contains(&x), "{x} mm");
+        }
+        // Still there along x.
+        let (state, y) = ends(&part("y", mm_per_s(-20.0)), 1.0);
+        assert_eq!(state, MotionState::Done);
+        assert!((-1.5..=-1.4995).contains(&y), "{y} mm");
+        let (state, turned) = ends(&part("theta", arcsec_per_s(3600.0)), 1.5);
+        assert_eq!(state, MotionState::Done);
+        assert!((0.499..=0.5).contains(&turned), "{turned} degrees");
+        let (_, x) = ends(&part("x", mm_per_s(-2.0)), 0.5);
+        assert!((-1.0..1.4).contains(&x), "{x} mm");
+        // A motion goes on from there.
+        let middle = bed.begin(&super::together::pose(0.0, 0.0, 0.0));
+        assert_eq!(bed.ended(&middle).state, MotionState::Done);
+    });
+}
+
+#[test]
+fn what_a_platform_cannot_do_is_not_jogged() {
+    with_platform(|bed| {
+        let here = bed.screws_mm();
+        let refused = |request: &JogRequest, code: Code, said: &str| {
+            let problem = bed.client.jog(&bert(), request).unwrap_err();
+            assert_eq!(problem.code, code, "{problem}");
+            assert!(problem.to_string().contains(said), "{problem}");
+        };
+        refused(&part("x", arcsec_per_s(5.0)), Code::NotOffered, "\"2mm/s\"");
+        refused(
+            &part("theta", mm_per_s(1.0)),
+            Code::NotOffered,
+            "\"5deg/s\"",
+        );
+        refused(&part("u", mm_per_s(1.0)), Code::NotOffered, "theta");
+        refused(&part("z", mm_per_s(1.0)), Code::NoSuchAxis, "z");
+        refused(
+            &part("x", mm_per_s(0.0)),
+            Code::NoSuchMotion,
+            "x is not jogged",
+        );
+        bed.client.power(&anna(), "w", false).unwrap();
+        refused(&part("x", mm_per_s(1.0)), Code::AxisDisabled, "w");
+        bed.client.power(&anna(), "w", true).unwrap();
+        bed.let_time_pass(0.3);
+        for (before, after) in here.into_iter().zip(bed.screws_mm()) {
+            assert!((after - before).abs() < 1e-3, "a screw moved");
+        }
+        let moving = bed.begin(&super::together::pose(1.0, 1.0, 0.0));
+        refused(&part("x", mm_per_s(1.0)), Code::AxisBusy, &moving);
+        bed.ended(&moving);
+    });
 }

@@ -22,7 +22,7 @@ pub(super) fn few_strokes(text: String) -> String {
         .edit("runs = 2", "runs = 1")
 }
 
-fn with_platform(body: impl Fn(&Bed<'_>)) {
+pub(super) fn with_platform(body: impl Fn(&Bed<'_>)) {
     with_platform_of(few_strokes, body);
 }
 
@@ -64,7 +64,7 @@ impl Bed<'_> {
         view
     }
 
-    fn screws_mm(&self) -> [f64; 3] {
+    pub(super) fn screws_mm(&self) -> [f64; 3] {
         ["u", "v", "w"].map(|it| self.encoder_mm(it))
     }
 

@@ -10,7 +10,7 @@ use crate::Failure;
 use crate::program::MoveArgs;
 use crate::program::exchange::ask_on;
 use crate::program::jog::JogArgs;
-use crate::program::jogs::told;
+use crate::program::kind::kind_of_axes;
 use crate::program::output::{Ended, Output};
 use crate::program::targets::AskedMotion;
 
@@ -53,7 +53,9 @@ impl Service {
     pub(crate) fn jog(&self, args: &JogArgs, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
         let (jog, stop) = (args.jog()?, stop_request()?);
-        self.zero_first(Some(&jog.axis), &stop, output)?;
+        let named = [jog.axis.as_str()].into_iter();
+        let jogs = &kind_of_axes(&args.machine, named)?.jog;
+        self.zero_first(jogs.zeroed.or(Some(&jog.axis)), &stop, output)?;
         let id = self.begin("/v1/jog", &jog.request())?;
         // By the wall: whoever keeps the machine has its own clock.
         let end = jog.duration.map(|it| Instant::now() + it);
@@ -72,7 +74,9 @@ impl Service {
             _ if stop.is_requested() => Err(stop.failure().into()),
             Some("stopped") if !is_ours => Err(stopped(&motion)),
             _ => {
-                let (text, value) = told(&jog.axis, &motion).unwrap_or_else(|| words_of(&motion));
+                let (text, value) = jogs
+                    .told(&jog.axis, &motion)
+                    .unwrap_or_else(|| words_of(&motion));
                 output.result(&text, &value)
             }
         }

@@ -20,7 +20,7 @@ pub(crate) mod verbs;
 
 use machine::records::Log;
 
-use super::jogs::of_linear_axis;
+use super::jogs::Jogs;
 use super::show::Shown;
 use super::targets::axis_motion;
 use super::text::table_notes;
@@ -47,7 +47,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
-    jog: of_linear_axis,
+    jog: Jogs::OF_A_LINEAR_AXIS,
     motion: axis_motion,
     asked: &[],
     words: &told::TELLER,

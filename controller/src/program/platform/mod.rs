@@ -20,12 +20,13 @@ use std::path::Path;
 use machine::records::{Log, read_journal};
 use report::PlatformPage;
 
-use super::jogs::of_linear_axis;
+use super::jogs::Jogs;
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
 use crate::Failure;
 use crate::platform::{PlatformLog, ScrewContent};
+use crate::ports::Use;
 
 /// What it does for the verbs of the cycle.
 pub(crate) const VERBS: Verbs = Verbs {
@@ -38,7 +39,13 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
-    jog: of_linear_axis,
+    jog: Jogs {
+        run: verbs::jog,
+        purpose: Use::Measurement,
+        zeroed: Some(PLATFORM),
+        by: "the encoders of the screws",
+        end: ("at the end of its reach", "at_end_of_reach"),
+    },
     motion: target::motion,
     asked: &[],
     words: &told::TELLER,

@@ -20,6 +20,8 @@ pub(crate) fn printed() -> Printed {
                 .counted()
                 .judged(),
             moved(),
+            jog("of a platform", "encoder_mm"),
+            jog("that turns a platform", "encoder_deg"),
             fit(),
             plan(),
             diff(),
@@ -34,6 +36,15 @@ pub(crate) fn printed() -> Printed {
             ("harmonic-shift", leak()),
         ],
     }
+}
+
+fn jog(what: &'static str, encoders: &'static str) -> Form {
+    let members = [
+        ("axis", text()),
+        (encoders, number()),
+        ("at_end_of_reach", truth()),
+    ];
+    Form::new("jog", what, members).counted()
 }
 
 fn maybe() -> Shape {

@@ -2,11 +2,13 @@
 
 use serde_json::{Value, json};
 
+use crate::jogging::Jogged;
 use crate::platform::calibrate::PlatformCalibrated;
 use crate::platform::verify::{Aligned, PlatformVerified};
 use crate::platform::zero::PlatformZeroed;
-use crate::platform::{PlatformMoved, Pose, PoseMoved};
+use crate::platform::{PlatformMoved, Pose, PoseJog, PoseMoved};
 use crate::ports::Use;
+use crate::program::jogs::Jog;
 use crate::program::json as to_json;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::platform::fit::outlier_lines;
@@ -340,4 +342,12 @@ fn pose_value(pose: Pose) -> Value {
         "y_mm": pose.y.mm(),
         "theta_arcsec": pose.angle.arcsec(),
     })
+}
+
+pub(crate) fn jog(machine: &mut Machine, store: &Store, jog: &Jog) -> Result<Jogged, Failure> {
+    let pose_jog = PoseJog::new(&jog.axis, jog.speed)?;
+    machine.platform()?.check_jog(pose_jog)?;
+    machine.start()?;
+    machine.platform()?.zero(store)?;
+    machine.platform()?.jog(pose_jog, jog.duration)
 }

@@ -23,11 +23,13 @@ use compensator::rotary::Sighted;
 use machine::records::{Log, read_journal};
 use units::Radians;
 
+use super::jogs::Jogs;
 use super::made_from::made_from;
 use super::show::Shown;
 use super::verbs::Verbs;
 use crate::Failure;
 use crate::config::MachineConfig;
+use crate::ports::Use;
 use crate::rotary::placed::closure_noise;
 use crate::rotary::{PlateLog, RotaryCalibrateConfig, RotaryContent};
 
@@ -45,7 +47,13 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
-    jog: verbs::jog,
+    jog: Jogs {
+        run: verbs::jog,
+        purpose: Use::Motion,
+        zeroed: None,
+        by: "its encoder",
+        end: ("where its drive counts no further", "at_last_count"),
+    },
     motion: targets::motion,
     asked: asked::ASKED,
     words: &told::TELLER,

@@ -23,7 +23,7 @@ use std::path::Path;
 use machine::records::{Log, read_journal};
 use report::Made;
 
-use super::jogs::of_linear_axis;
+use super::jogs::Jogs;
 use super::made_from::source;
 use super::show::Shown;
 use super::targets::{AskedMotion, axis_motion};
@@ -43,7 +43,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     calibrate: verbs::calibrate,
     verify: verbs::verify,
     move_to: verbs::move_to,
-    jog: of_linear_axis,
+    jog: Jogs::OF_A_LINEAR_AXIS,
     motion,
     asked: asked::ASKED,
     words: &told::TELLER,

@@ -74,6 +74,14 @@ function showGroups(groups) {
       const [uncompensated, align] = [".uncompensated", ".align"].map((it) => agreed(made.querySelector(it)));
       told(ask("POST", "/v1/motions", { targets: Object.fromEntries(named), uncompensated, align }));
     });
+    for (const target of targets) {
+      const row = byId("axis-card").content.querySelector(".jog").parentElement.cloneNode(true);
+      row.querySelector(".power").remove();
+      row.querySelector("label").firstChild.data = `Jog ${target} `;
+      if (target === "theta") row.querySelector(".speed").value = "60arcsec/s";
+      for (const it of row.querySelectorAll(".jog")) holdToJog(it, target, row.querySelector(".speed"));
+      made.append(row);
+    }
     byId("axes").prepend(made);
     axes.forEach((axis) => together.add(axis));
     showControl();

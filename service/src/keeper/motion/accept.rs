@@ -130,14 +130,7 @@ impl Keeper {
     ) -> Result<(), Problem> {
         match if_moving {
             IfMoving::Queue => Ok(()),
-            IfMoving::Refuse => {
-                motion.axes().try_for_each(|at| self.require_free(at))?;
-                self.require_unclaimed(motion)?;
-                match motion.together {
-                    Some(_) => self.require_no_run(),
-                    None => Ok(()),
-                }
-            }
+            IfMoving::Refuse => self.require_free_for(motion),
             IfMoving::Supersede => {
                 for at in motion.axes() {
                     if let Task::Run(..) | Task::Power(_) = self.seats[at].task {
@@ -153,6 +146,16 @@ impl Keeper {
         }
     }
 
+    /// Refuses `motion` where something else has what it needs.
+    pub(super) fn require_free_for(&self, motion: &Motion) -> Result<(), Problem> {
+        motion.axes().try_for_each(|at| self.require_free(at))?;
+        self.require_unclaimed(motion)?;
+        match motion.together {
+            Some(_) => self.require_no_run(),
+            None => Ok(()),
+        }
+    }
+
     /// Whether the procedure that has the machine is that of a motion that the new one stops.
     fn supersedes_a_procedure(&self, motion: &Motion) -> bool {
         let mut active = self.motions.active.iter();
@@ -160,7 +163,7 @@ impl Keeper {
     }
 
     /// Another motion may wait for an axis that is free.
-    pub(super) fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
+    fn require_unclaimed(&self, motion: &Motion) -> Result<(), Problem> {
         let mut others = self.motions.active.iter();
         let other = others.find(|it| shares_an_axis(it, motion));
         other.map_or(Ok(()), |other| {

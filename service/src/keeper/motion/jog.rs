@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use machine::Machine;
 use truestage::Failure;
+use truestage::runs::Moved;
 use units::{Approach, AxisSpeed, Radians};
 
 use super::super::Keeper;
@@ -18,6 +19,15 @@ use crate::request::{JogRequest, MoveRequest, WayName};
 /// A jog that was not renewed for so long stops.
 const DEAD_MAN: Duration = Duration::from_millis(200);
 
+/// What is jogged.
+#[derive(Clone, Copy)]
+enum Subject {
+    /// The axis of this number.
+    Axis(usize),
+    /// A part of where the group of this number is, whose axes move as one.
+    Part(usize),
+}
+
 impl Keeper {
     /// Begins the jog `id`, renews the one that goes on, or ends it; the name of the one that it is about.
     pub(in super::super) fn jog(
@@ -28,64 +38,107 @@ impl Keeper {
         request: &JogRequest,
     ) -> Result<String, Problem> {
         self.require_running()?;
-        let at = self.place(&request.axis)?;
-        let speed = request.speed.0;
-        let going = self.jog_of(at);
+        let subject = self.subject(&request.axis)?;
+        let going = self.jog_of(subject);
         if let Some(number) = going
-            && self.motions.active[number].jog == Some(speed)
+            && self.motions.active[number].jog.as_ref() == Some(request)
         {
             let renewed = self.motions.active[number].id.to_string();
             return self.renew(machine.now(), &renewed).map(|()| renewed);
         }
-        if speed.value() == 0.0 {
+        if request.speed.0.value() == 0.0 {
             return self.end_jog(machine, going, by, &request.axis);
         }
         self.require_no_hands()?;
-        let motion = self.jog_motion(machine, id, by, request, at)?;
+        let motion = self.jog_motion(machine, (id, by), request, subject)?;
         match going {
             // The other way, or at another speed: from rest.
             Some(number) => self.stop_jog(machine, number, by),
-            None => {
-                self.require_free(at)?;
-                self.require_unclaimed(&motion)?;
-            }
+            None => self.require_free_for(&motion)?,
         }
         self.queue(motion);
         Ok(id.to_owned())
     }
 
-    /// The jog of axis `at` that goes on, or is about to begin.
-    fn jog_of(&self, at: usize) -> Option<usize> {
+    /// What `name` is: axes that never move by themselves are jogged by the parts of where they are together.
+    fn subject(&self, name: &str) -> Result<Subject, Problem> {
+        let mut groups = self.groups.iter();
+        let of = groups.position(|it| {
+            let group = &it.group;
+            group.moved == Moved::Together && group.parts.iter().any(|part| part.name == name)
+        });
+        match of {
+            Some(group) => Ok(Subject::Part(group)),
+            None => self.place(name).map(Subject::Axis),
+        }
+    }
+
+    /// The jog of `subject` that goes on, or is about to begin.
+    fn jog_of(&self, subject: Subject) -> Option<usize> {
+        let is_of = |motion: &Motion| match subject {
+            Subject::Axis(at) => motion.axes().any(|of| of == at),
+            Subject::Part(group) => {
+                let together = motion.together.as_ref();
+                together.is_some_and(|it| it.group() == group)
+            }
+        };
         let mut active = self.motions.active.iter();
         active.position(|it| {
             let goes_on = !matches!(it.phase, Phase::Stopping(_));
-            it.jog.is_some() && goes_on && it.axes().any(|of| of == at)
+            it.jog.is_some() && goes_on && is_of(it)
         })
     }
 
-    /// As far as the axis goes on that side, by the encoder.
+    /// As far as it goes on that side, by the encoders.
     fn jog_motion(
         &self,
         machine: &Machine,
-        id: &str,
-        by: &str,
+        (id, by): (&str, &str),
         request: &JogRequest,
-        at: usize,
+        subject: Subject,
     ) -> Result<Motion, Problem> {
-        let speed = request.speed.0;
-        let (target, way) = end_of(machine, &self.seats[at], speed)?;
-        let request = MoveRequest {
-            speed: Some(speed.abs().into()),
-            way,
+        let wanted = request.speed.0;
+        let asked = MoveRequest {
             uncompensated: true,
-            ..MoveRequest::of(&request.axis, target)
+            ..match subject {
+                Subject::Axis(at) => alone(machine, &self.seats[at], wanted)?,
+                Subject::Part(group) => self.as_one(machine, group, request)?,
+            }
         };
         let now = machine.now();
-        let mut motion = self.motion_of(now, id, by, &request)?;
-        motion.jog = Some(speed);
+        let mut motion = self.motion_of(now, id, by, &asked)?;
+        if let Some(together) = &mut motion.together {
+            together.run_on(wanted);
+        }
+        motion.jog = Some(request.clone());
         motion.dead_man = Some((DEAD_MAN, now + DEAD_MAN));
         self.plan_legs(machine, &mut motion)?;
         Ok(motion)
+    }
+
+    /// The motion of a part of where the group of this number is, to the end of its reach.
+    fn as_one(
+        &self,
+        machine: &Machine,
+        group: usize,
+        request: &JogRequest,
+    ) -> Result<MoveRequest, Problem> {
+        let (grouped, axis) = (&self.groups[group], &request.axis);
+        let turns = grouped
+            .group
+            .parts
+            .iter()
+            .any(|it| it.turns && it.name == *axis);
+        match turns {
+            true => speed::round(axis, request.speed.0).map(drop),
+            false => speed::along(axis, request.speed.0).map(drop),
+        }?;
+        for at in &grouped.axes {
+            let zeroed = machine.require_zeroed(&self.seats[*at].name);
+            zeroed.map_err(Failure::from)?;
+        }
+        let end = grouped.end_of_jog(machine, axis, request.speed.0)?;
+        Ok(MoveRequest::of(axis, Coordinate::from(end)))
     }
 
     fn end_jog(
@@ -114,28 +167,29 @@ impl Keeper {
     }
 }
 
-/// Where a jog at `wanted` ends when nothing ends it before: at the soft limit, or where the drive of an axis that turns
-/// counts no further.
-fn end_of(
-    machine: &Machine,
-    seat: &Seat,
-    wanted: AxisSpeed,
-) -> Result<(Coordinate, Option<WayName>), Problem> {
-    match &seat.mechanics {
+/// The motion of an axis by itself, to its soft limit, or where the drive of one that turns counts no further.
+fn alone(machine: &Machine, seat: &Seat, wanted: AxisSpeed) -> Result<MoveRequest, Problem> {
+    let (target, way) = match &seat.mechanics {
         Mechanics::Linear(own) => {
             speed::along(&seat.name, wanted)?;
             let limit = match wanted.approach() {
                 Approach::Forward => own.settings.soft_max,
                 Approach::Reverse => own.settings.soft_min,
             };
-            Ok((limit.into(), None))
+            (Coordinate::from(limit), None)
         }
         Mechanics::Turning(_) => {
             speed::round(&seat.name, wanted)?;
             let last = last_angle(machine, &seat.name, wanted.approach());
-            Ok((last.map_err(Failure::from)?.into(), Some(WayName::Turns)))
+            let last = last.map_err(Failure::from)?;
+            (last.into(), Some(WayName::Turns))
         }
-    }
+    };
+    Ok(MoveRequest {
+        speed: Some(wanted.abs().into()),
+        way,
+        ..MoveRequest::of(&seat.name, target)
+    })
 }
 
 fn last_angle(machine: &Machine, axis: &str, way: Approach) -> Result<Radians, machine::Failure> {

@@ -5,6 +5,7 @@ use truestage::linear::{Corrected, LinearTeller, Moved};
 use truestage::rotary::RotaryTeller;
 use truestage::runs::{Teller, Told};
 
+use super::super::groups::Grouped;
 use super::super::mechanics::{Mechanics, approach};
 use super::super::seat::Seat;
 use super::going::Going;
@@ -49,14 +50,15 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
 /// A motion that has ended, with where its axes stand.
 pub(super) fn ended(
     motion: &Motion,
-    seats: &[Seat],
+    (seats, groups): (&[Seat], &[Grouped]),
     machine: &Machine,
     teller: Option<&Teller>,
     end: End,
 ) -> MotionView {
     let mut view = view(motion, seats);
     if let Some(together) = &motion.together {
-        view.axes = together::ended(together, seats, machine);
+        let standing = groups[together.group()].standing(machine);
+        view.axes = together::ended(together, seats, machine, &standing);
         let told = together.moved().and_then(|it| it.told.clone());
         view.told = told
             .filter(|_| matches!(end, End::Done))

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use machine::Machine;
 use truestage::Agreed;
 use truestage::runs::{Group, GroupMove, GroupMoved, Moved, Place};
-use units::Time;
+use units::{AxisSpeed, Time};
 
 use super::super::seat::{Seat, Task};
 use super::super::{Job, Keeper, Mode};
@@ -45,6 +45,15 @@ pub(super) struct Together {
 }
 
 impl Together {
+    /// It is a jog, at `speed`.
+    pub(super) fn run_on(&mut self, speed: AxisSpeed) {
+        self.asked.jog = Some(speed);
+    }
+
+    pub(super) const fn group(&self) -> usize {
+        self.group
+    }
+
     pub(super) fn axes(&self) -> impl Iterator<Item = usize> + Clone {
         self.axes.iter().copied()
     }
@@ -148,6 +157,7 @@ impl Keeper {
                     beyond: false,
                 },
                 align: request.align,
+                jog: None,
             },
             progress: Progress::Waiting,
         }))
@@ -210,7 +220,10 @@ impl Keeper {
         together.progress = Progress::UnderWay;
         for at in together.axes() {
             let seat = &mut self.seats[at];
-            seat.task = Task::Together(Arc::clone(&motion.id));
+            seat.task = match motion.jog {
+                None => Task::Together(Arc::clone(&motion.id)),
+                Some(_) => Task::Jog(Arc::clone(&motion.id)),
+            };
             seat.rests_at = None;
         }
         self.job = Some(Job::Move(Arc::clone(&motion.id)));
@@ -331,13 +344,19 @@ fn targets_of(request: &MoveRequest, group: &Group) -> Result<Vec<(String, Place
     targets.collect()
 }
 
-/// Each part as it ended.
+/// Each part as it ended; `standing` is where the encoders have those that are not axes.
 pub(super) fn ended(
     together: &Together,
     seats: &[Seat],
     machine: &Machine,
+    standing: &[(String, Place)],
 ) -> BTreeMap<String, LegView> {
     let mut legs = together.legs();
+    for (name, place) in standing {
+        if let Some(leg) = legs.get_mut(name) {
+            leg.encoder = Some(Coordinate::from(*place).shown());
+        }
+    }
     for (name, leg) in &mut legs {
         if let Some(seat) = together.axis(name, seats) {
             let (position, encoder) = seat.place_shown(machine);
