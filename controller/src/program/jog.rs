@@ -10,6 +10,7 @@ use units::text::axis_speed;
 use crate::program::MachineArgs;
 use crate::program::jogs::Jog;
 use crate::program::json::counters;
+use crate::program::kept::or_by_its_service;
 use crate::program::kind::by_kind;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::Session;
@@ -66,8 +67,13 @@ fn speed_of_axis(text: &str) -> Result<(String, AxisSpeed), Failure> {
     })
 }
 
-/// Zeroes the axis and jogs it, on a machine that nobody else has.
+/// Jogs an axis here, or by the service that keeps its machine.
 pub(crate) fn run(args: &JogArgs, output: Output) -> Ended {
+    or_by_its_service(here(args, output), |service| service.jog(args, output))
+}
+
+/// Zeroes the axis and jogs it, on a machine that nobody else has.
+fn here(args: &JogArgs, output: Output) -> Ended {
     let jog = args.jog()?;
     by_kind(&args.machine, [jog.axis.as_str()].into_iter(), |kind| {
         let mut session = Session::open(&args.machine, "jog", kind.jog.purpose, output)?;

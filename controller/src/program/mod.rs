@@ -464,12 +464,7 @@ fn done(
         Command::Calibrate(args) => before::run(Intent::Calibrate(&args), output),
         Command::Verify(args) => before::run(Intent::Verify(&args), output),
         Command::Move(args) => before::run(Intent::Move(&args.settle()), output),
-        Command::Jog(args) => {
-            let args = args.settle();
-            kept::or_by_its_service(jog::run(&args, output), |service| {
-                service.jog(&args, output)
-            })
-        }
+        Command::Jog(args) => jog::run(&args.settle(), output),
         Command::Reference(args) => volumetric::reference::run(&args, output),
         Command::Align(args) => align::run(&args, output),
         Command::Run(args) => run::run(args, output),
