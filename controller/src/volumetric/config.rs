@@ -1,6 +1,7 @@
 //! `[volumetric]`: three linear axes whose errors are corrected throughout the work volume while
 //! the machine works (system S4). Each key's suffix is its unit.
 
+use compensator::volumetric::Axis;
 use machine::records::CertificateRecord;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -93,6 +94,12 @@ fn of_thermometer(at: usize) -> String {
 }
 
 impl VolumetricConfig {
+    /// Between how many stretches along `axis` its errors have nodes, where these are so far apart at most.
+    pub(super) fn stretches(&self, axis: Axis, step_mm: f64) -> u32 {
+        let span = self.high_mm[axis.index()] - self.low_mm[axis.index()];
+        (span / step_mm).ceil().max(2.0) as u32
+    }
+
     /// The roll detectors of x, y and z.
     pub fn rolls(&self) -> [Option<&RollConfig>; 3] {
         let axes = [VolumeAxisName::X, VolumeAxisName::Y, VolumeAxisName::Z];

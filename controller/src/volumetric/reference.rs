@@ -335,19 +335,13 @@ impl WorkVolume<'_> {
     }
 }
 
-/// Between how many stretches along `axis` its errors have nodes.
-pub(super) fn stretches(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> u32 {
-    let span = config.high_mm[axis.index()] - config.low_mm[axis.index()];
-    (span / step_mm).ceil().max(2.0) as u32
-}
-
 /// From one end of the work volume to the other. Where errors have nodes the detectors are read
 /// too: between nodes errors are straight lines, and what a detector reads there is none.
 fn stops_along(config: &VolumetricConfig, axis: Axis, step_mm: f64) -> Vec<Metres> {
     let (low, high) = (config.low_mm[axis.index()], config.high_mm[axis.index()]);
     let wanted = ((high - low) / step_mm).ceil().max(1.0) as u32;
     let nodes = config.calibrate.as_ref();
-    let nodes = nodes.map_or(1, |it| stretches(config, axis, it.step_mm));
+    let nodes = nodes.map_or(1, |it| config.stretches(axis, it.step_mm));
     let steps = wanted.next_multiple_of(nodes);
     let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(steps);
     (0..=steps).map(|it| Metres::from_mm(at(it))).collect()
@@ -515,7 +509,7 @@ mod tests {
         let config = crate::config::parse(text, "m").unwrap().config;
         let config = config.volumetric.unwrap();
         for axis in Axis::ALL {
-            let nodes = stretches(&config, axis, config.calibrate.as_ref().unwrap().step_mm);
+            let nodes = config.stretches(axis, config.calibrate.as_ref().unwrap().step_mm);
             for step_mm in [25.0, 30.0, 50.0, 70.0] {
                 let stops = stops_along(&config, axis, step_mm);
                 let apart = (stops[1] - stops[0]).mm();

@@ -1,9 +1,14 @@
 //! What is doubtful of three axes that are sound.
 
-use units::Metres;
+use compensator::volumetric::Axis;
+use units::{Metres, Short};
 
+use super::config::{VolumetricCalibrateConfig, VolumetricConfig};
 use crate::config::MachineConfig;
-use crate::config::judge::Finding;
+use crate::config::judge::{Finding, Judge};
+
+/// Fewer nodes of a function say hardly anything of what it does between them (docs/reliability.md).
+const NODES_MIN: u32 = 6;
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(volume) = &config.volumetric else {
@@ -12,6 +17,11 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(own) = &volume.calibrate else {
         return;
     };
+    check_nodes(
+        &mut Judge::at("volumetric.calibrate".into(), found),
+        volume,
+        own,
+    );
     let lengths = volume.high_mm.iter().zip(&volume.low_mm);
     let longest = lengths.map(|(high, low)| high - low).fold(0.0, f64::max);
     let length = Metres::from_mm(longest);
@@ -20,6 +30,32 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
         .into_iter()
         .flat_map(|it| it.switched_off_of_lines());
     found.extend(off.map(|it| it.warned(&own.instrument, "x, y and z", length)));
+}
+
+fn check_nodes(judge: &mut Judge<'_>, volume: &VolumetricConfig, own: &VolumetricCalibrateConfig) {
+    let of_axis = |axis: Axis| (axis, volume.stretches(axis, own.step_mm) + 1);
+    let few = Axis::ALL.map(of_axis).into_iter();
+    let few: Vec<(Axis, u32)> = few.filter(|it| it.1 < NODES_MIN).collect();
+    let length = |at: &(Axis, u32)| volume.high_mm[at.0.index()] - volume.low_mm[at.0.index()];
+    let shortest = few.iter().map(length).fold(f64::INFINITY, f64::min);
+    let Some(told) = few
+        .iter()
+        .map(|(axis, nodes)| format!("{nodes} of {axis}"))
+        .reduce(|all, it| all + ", " + &it)
+    else {
+        return;
+    };
+    judge.say(
+        "step_mm",
+        format!(
+            "the errors are told at {told} places only: what they do between them hardly shows there, and the tool is \
+             less certain than is stated"
+        ),
+        format!(
+            "give at most {} for {NODES_MIN} places of each",
+            Short(shortest / f64::from(NODES_MIN - 1))
+        ),
+    );
 }
 
 #[cfg(test)]
@@ -43,5 +79,23 @@ mod tests {
             "drift by 0.048 µm",
         );
         check(VOLUMETRIC, &edits, &[air.as_str()], "NOT CORRECTED for air");
+    }
+
+    #[test]
+    fn functions_of_few_nodes_are_told_with_the_step_that_would_do() {
+        let own = "[volumetric.calibrate]\ninstrument = \"laser\"\nstep_mm = ";
+        let from = format!("{own}50.0");
+        let key = "volumetric.calibrate.step_mm";
+        let says = "at 5 of y, 4 of z places only";
+        check(VOLUMETRIC, &[(&from, &format!("{own}100.0"))], &[key], says);
+        check(
+            VOLUMETRIC,
+            &[(&from, &format!("{own}80.0"))],
+            &[key],
+            "at 5 of z places",
+        );
+        let edit = format!("{own}60.0");
+        let none: [&str; 0] = [];
+        check(VOLUMETRIC, &[(&from, &edit)], &none, "");
     }
 }

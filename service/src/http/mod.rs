@@ -1,5 +1,5 @@
 //! The edge: HTTP and JSON on a Unix socket and on TCP. It can hang, be flooded or die; the machine's thread
-//! never waits for it.
+//! waits for nothing of it.
 //!
 //! Each place has a thread and a tokio runtime of its own: what floods one keeps nobody waiting at another. Errors are
 //! problems by RFC 9457, `/openapi.json` says what there is.

@@ -420,7 +420,7 @@ const THERMOMETERS_K: f64 = 0.003;
 pub(super) const BEAMS_UM: f64 = 0.08;
 /// Likewise what references of a beam are off by as a straightness, beside their scatter and the spot's width, micrometres:
 /// a source that shifts while they are taken.
-const BEAM_REFERENCES_UM: f64 = 0.02;
+pub(super) const BEAM_REFERENCES_UM: f64 = 0.02;
 /// Likewise references of a roll, beside their scatter and the volts per millimetre, arcseconds: a converter's step.
 const ROLL_REFERENCES_ARCSEC: f64 = 0.01;
 

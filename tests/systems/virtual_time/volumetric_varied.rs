@@ -8,8 +8,8 @@ use tests::volume::Volume;
 use tests::{Edit, random, seeds};
 
 use super::volumetric_day::{
-    BEAMS_UM, EXACT, count_days, day_in, days_of, exact, frame_of, laser_as_stated, read_of,
-    rolls_as_stated,
+    BEAM_REFERENCES_UM, BEAMS_UM, EXACT, count_days, day_in, days_of, exact, frame_of,
+    laser_as_stated, read_of, rolls_as_stated,
 };
 use super::volumetric_rolls::emulated_three_rolls;
 
@@ -33,8 +33,10 @@ impl Drawn {
     fn new(seed: u64) -> Self {
         let mut state = seed ^ 0x7A21_ED00;
         let mut over = |low: f64, high: f64| low * (high / low).powf(random(&mut state));
-        let (errors, warmth, beams) = (over(0.3, 3.0), over(0.3, 2.0), over(0.5, 3.0));
-        let (noise_mv, rest_error_nm) = (over(0.03, 0.3), over(2.0, 50.0));
+        // Larger errors are refused by limits of the shipped machine's user, less warmth as it tells nothing of what it
+        // does, and slides that stand less still never stand within their window.
+        let (errors, warmth, beams) = (over(0.2, 1.8), over(0.6, 2.0), over(0.5, 3.0));
+        let (noise_mv, rest_error_nm) = (over(0.03, 0.3), over(2.0, 15.0));
         let step_mm = [25.0, 50.0, 100.0][(3.0 * random(&mut state)) as usize];
         Self {
             errors,
@@ -80,9 +82,14 @@ impl Drawn {
     fn machine(&self, text: &str) -> String {
         let sources = (BEAMS_UM.powi(2) - Self::AIR_AND_SPOT_UM.powi(2)).sqrt() * self.beams;
         let beams = sources.hypot(Self::AIR_AND_SPOT_UM);
+        let references = BEAM_REFERENCES_UM * self.beams;
         text.edit(
             &format!("\nstandard_uncertainty_um = {BEAMS_UM}"),
             &format!("\nstandard_uncertainty_um = {beams}"),
+        )
+        .edit(
+            &format!("reference_standard_uncertainty_um = {BEAM_REFERENCES_UM}"),
+            &format!("reference_standard_uncertainty_um = {references}"),
         )
         .edit(
             "[volumetric.calibrate]\ninstrument = \"laser\"\nstep_mm = 50.0",

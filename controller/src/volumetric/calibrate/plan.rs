@@ -9,7 +9,6 @@ use crate::store::IdentityRecord;
 use crate::volumetric::VolumetricFailure;
 use crate::volumetric::calibrate::known::expansion_plans;
 use crate::volumetric::line::{LineOptics, LineTask};
-use crate::volumetric::reference::stretches;
 use crate::volumetric::settings::{
     bend_plans, function_shape, point_of_mm, volumetric_chain, work_volume,
 };
@@ -109,7 +108,7 @@ pub(super) const fn axis_of(name: ErrorName) -> Axis {
 
 /// How many nodes there are along each axis.
 pub(super) fn nodes(config: &VolumetricConfig, own: &VolumetricCalibrateConfig) -> [usize; 3] {
-    Axis::ALL.map(|axis| stretches(config, axis, own.step_mm) as usize + 1)
+    Axis::ALL.map(|axis| config.stretches(axis, own.step_mm) as usize + 1)
 }
 
 /// Tilts and positioning errors count from the machine's zero, where the volume has it.
