@@ -11,6 +11,7 @@ import time
 import urllib.request
 from pathlib import Path
 
+from child import dies_with_its_parent
 from websocket import create_connection
 
 PATIENCE_S = 60.0
@@ -29,7 +30,9 @@ class Browser:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory(prefix="browser-")
         words = [self.program, *WORDS, f"--user-data-dir={self.folder.name}", "about:blank"]
-        self.process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.process = subprocess.Popen(
+            words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=dies_with_its_parent
+        )
         try:
             port = self._port()
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list", timeout=PATIENCE_S) as answer:

@@ -15,6 +15,8 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
+from child import dies_with_its_parent
+
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 # How long anything is waited for; only a broken run takes so long.
 PATIENCE_S = 60.0
@@ -158,7 +160,11 @@ class KeptMachine:
         said = self.path / f"{name}.log"
         with said.open("w") as log:
             process = subprocess.Popen(
-                [str(self.programs / name), *words], cwd=self.path, stdout=log, stderr=log
+                [str(self.programs / name), *words],
+                cwd=self.path,
+                stdout=log,
+                stderr=log,
+                preexec_fn=dies_with_its_parent,
             )
         self.processes.append(process)
         wait_for(
