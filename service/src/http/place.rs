@@ -59,9 +59,7 @@ impl Listen {
             settled => Ok(settled),
         }
     }
-}
 
-impl Listen {
     /// What its text begins with.
     pub(super) const fn word(&self) -> &'static str {
         match self {

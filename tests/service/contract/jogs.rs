@@ -1,5 +1,6 @@
 //! Jogs: an axis runs as long as somebody says so.
 
+use core::ops::RangeInclusive;
 use core::time::Duration;
 
 use service::{AxisState, Code, JogRequest, MotionState, MoveRequest, Speed, StopMode, WayName};
@@ -50,6 +51,33 @@ impl Bed<'_> {
         jogs.unwrap_or_else(|problem| panic!("{problem}"))
     }
 
+    /// Jogs an axis that stands at `from` for a second, and then says nothing more of it: it goes so far in that second,
+    /// and so far afterwards, in the axis's unit.
+    fn stops_when_nobody_renews(
+        &self,
+        request: &JogRequest,
+        from: f64,
+        (in_a_second, afterwards): (RangeInclusive<f64>, RangeInclusive<f64>),
+    ) {
+        let name = request.axis.as_str();
+        // Five times as long as an axis runs without being told so.
+        let id = self.keeps_jogging(request, 1.0);
+        let axis = self.client.axis(name).unwrap();
+        assert_eq!(axis.state, AxisState::ContinuousMotion);
+        assert_eq!(self.now(&id).state, MotionState::Moving);
+        let so_far = self.encoder_mm(name) - from;
+        assert!(in_a_second.contains(&so_far), "{so_far} in 1 s");
+        self.lets_go();
+        let view = self.ended(&id);
+        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
+        assert_eq!(view.stopped.unwrap().by, "the dead-man of anna");
+        // 200 ms after the last word, and slowing down.
+        let on = self.encoder_mm(name) - from - so_far;
+        assert!(afterwards.contains(&on), "{on} without a word");
+        let stands = self.client.axis(name).unwrap().state;
+        assert_eq!(stands, AxisState::Standstill, "it stays enabled");
+    }
+
     /// Renews a jog for so long by the machine's clock.
     fn keeps_jogging(&self, request: &JogRequest, seconds: f64) -> String {
         self.stage.gate.limit(OFTEN);
@@ -70,25 +98,7 @@ impl Bed<'_> {
 fn a_jog_runs_as_long_as_it_is_renewed_and_stops_when_nobody_renews_it() {
     with_zeroed_stage(|bed| {
         let from = bed.encoder_mm("x");
-        // Five times as long as an axis runs without being told so.
-        let id = bed.keeps_jogging(&jog(2.0), 1.0);
-        let axis = bed.client.axis("x").unwrap();
-        assert_eq!(axis.state, AxisState::ContinuousMotion);
-        assert_eq!(bed.now(&id).state, MotionState::Moving);
-        let so_far = bed.encoder_mm("x") - from;
-        assert!((1.5..=2.2).contains(&so_far), "{so_far} mm in 1 s");
-        bed.lets_go();
-        let view = bed.ended(&id);
-        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
-        assert_eq!(view.stopped.unwrap().by, "the dead-man of anna");
-        // 200 ms after the last word, and slowing down.
-        let on = bed.encoder_mm("x") - from - so_far;
-        assert!((0.0..=0.6).contains(&on), "{on} mm without a word");
-        assert_eq!(
-            bed.client.axis("x").unwrap().state,
-            AxisState::Standstill,
-            "it stays enabled"
-        );
+        bed.stops_when_nobody_renews(&jog(2.0), from, (1.5..=2.2, 0.0..=0.6));
     });
 }
 
@@ -169,23 +179,7 @@ fn what_must_not_move_is_not_jogged() {
 fn a_table_is_jogged_across_its_seam_as_long_as_that_is_renewed() {
     with_table(|bed| {
         let from = bed.turns_to(&turned(-5.0));
-        let id = bed.keeps_jogging(&turning(20.0), 1.0);
-        let axis = bed.client.axis("c").unwrap();
-        assert_eq!(axis.state, AxisState::ContinuousMotion);
-        assert_eq!(bed.now(&id).state, MotionState::Moving);
-        let so_far = bed.encoder_mm("c") - from;
-        assert!((15.0..=22.0).contains(&so_far), "{so_far} degrees in 1 s");
-        bed.lets_go();
-        let view = bed.ended(&id);
-        assert_eq!(view.state, MotionState::Stopped, "{view:?}");
-        assert_eq!(view.stopped.unwrap().by, "the dead-man of anna");
-        let on = bed.encoder_mm("c") - from - so_far;
-        assert!((0.0..=7.0).contains(&on), "{on} degrees without a word");
-        assert_eq!(
-            bed.client.axis("c").unwrap().state,
-            AxisState::Standstill,
-            "it stays enabled"
-        );
+        bed.stops_when_nobody_renews(&turning(20.0), from, (15.0..=22.0, 0.0..=7.0));
     });
 }
 
