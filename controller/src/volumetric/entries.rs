@@ -159,6 +159,9 @@ pub struct LineReadingEntry {
     /// earlier programs.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub common_si: f64,
+    /// Likewise what all readings of its line have in common of that, and no others.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub common_of_line_si: f64,
     /// Standard deviation of the samples averaged, of the path that was counted.
     pub scatter_m: Option<f64>,
     /// What the slides were displaced by beyond the references: across x, y, z, two directions each.
@@ -228,6 +231,7 @@ impl LineReadingEntry {
             deviation_si: read_si,
             u_si,
             common_si: observation.common,
+            common_of_line_si: observation.common_of_run,
             ..Self::default()
         }
     }
@@ -254,6 +258,7 @@ impl LineReadingEntry {
             run,
             reading,
             common: self.common_si,
+            common_of_run: self.common_of_line_si,
         })
     }
 }

@@ -150,6 +150,7 @@ fn reading(run: usize, mm: f64, below_mm: f64, reading: Reading) -> Observation 
         run,
         reading,
         common: 0.0,
+        common_of_run: 0.0,
     }
 }
 
@@ -191,10 +192,39 @@ fn lines() -> (Plan, Vec<Observation>) {
         [
             reading(0, *mm, 0.0, length(0.1 + 0.001 * mm)),
             reading(1, *mm, 120.0, length(0.2)),
-            reading(2, *mm, 0.0, angle),
+            Observation {
+                common_of_run: 4e-9 * mm,
+                ..reading(2, *mm, 0.0, angle)
+            },
         ]
     });
     (plan, observations.collect())
+}
+
+/// `it`, off by so much.
+fn off(it: &Observation, by: f64) -> Observation {
+    let reading = match it.reading {
+        Reading::Length { along, u, .. } => Reading::Length {
+            along,
+            deviation: Metres(by),
+            u,
+        },
+        Reading::Angle { about, u, .. } => Reading::Angle {
+            about,
+            deviation: Radians(by),
+            u,
+        },
+    };
+    Observation { reading, ..*it }
+}
+
+/// The standard uncertainty of a reading without what its run has in common.
+fn by_itself(it: &Observation) -> f64 {
+    let u = match it.reading {
+        Reading::Length { u, .. } => u.value(),
+        Reading::Angle { u, .. } => u.value(),
+    };
+    (u * u - it.common_of_run * it.common_of_run).sqrt()
 }
 
 /// How far the tool goes along x and z at a place, by the errors that `observations` tell.
@@ -211,17 +241,25 @@ fn moved(plan: &Plan, observations: &[Observation], (at, tool): ToolAt) -> [f64;
     ]
 }
 
-/// What each reading that is off by its standard uncertainty moves the tool by, along x and along z.
+/// What each reading that is off by its standard uncertainty moves the tool by, along x and along z, and then what
+/// each run does whose readings are all off by what they have in common.
 fn pulls(plan: &Plan, observations: &[Observation], place: ToolAt) -> [Vec<f64>; 2] {
-    let each = (0..observations.len()).map(|at| {
-        let mut off = observations.to_vec();
-        match &mut off[at].reading {
-            Reading::Length { deviation, u, .. } => *deviation = *u,
-            Reading::Angle { deviation, u, .. } => *deviation = *u,
-        }
-        moved(plan, &off, place)
+    let alone = (0..observations.len()).map(|at| {
+        let mut all = observations.to_vec();
+        all[at] = off(&all[at], by_itself(&all[at]));
+        all
     });
-    let each: Vec<[f64; 2]> = each.collect();
+    let together = (0..plan.runs.len()).map(|run| {
+        let each = observations.iter().map(|it| match it.run == run {
+            true => off(it, it.common_of_run),
+            false => *it,
+        });
+        each.collect()
+    });
+    let each: Vec<[f64; 2]> = alone
+        .chain(together)
+        .map(|it: Vec<Observation>| moved(plan, &it, place))
+        .collect();
     [0, 1].map(|k| each.iter().map(|it| it[k]).collect())
 }
 

@@ -5,11 +5,10 @@
 //! by how the values at the nodes differ from polynomials that the curve reproduces. These contrasts are
 //! compared with random functions of covariance a²·exp(−d²/2ℓ²): for each length ℓ on a grid, from the
 //! distance of the nodes to more than the travel, and each size a. All functions of one axis share their
-//! length, each has a size of its own; both are weighted by their likelihood, the noise of the nodes
-//! included, and averaged in logarithms: that is how far a function likely is from its curve ([`Extent::Likely`]).
-//! A few nodes hardly tell the size, as a few readings hardly tell a scatter (of Student's t with two degrees
-//! of freedom, one in 10 000 is beyond 100). Whoever refuses something because a function cannot be that far
-//! from its curve needs what it is at most ([`Extent::AtMost`]).
+//! length, and sizes are alike within displacements and within rotations ([`pooled`]); both are weighted by
+//! their likelihood, the noise of the nodes included. The mean square over all of them is how far a function
+//! likely is from its curve ([`Extent::Likely`]). Whoever refuses something because a function cannot be that
+//! far from its curve needs what it is at most ([`Extent::AtMost`]).
 //!
 //! | symbol | name here |
 //! |---|---|
@@ -24,24 +23,23 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use units::portable::{exp, ln};
 
 use super::Axis;
-use super::block::{Block, axis_of, kernel};
+use super::block::{Block, kernel};
 use crate::least_squares::Fit;
 use crate::volumetric::function::{INSIDE, Shape, between_at};
 
-/// Lengths that are tried, the longest in units of the travel.
-const LENGTHS: usize = 9;
+mod pooled;
+
+use pooled::{LENGTHS, Pooled, Seen};
+
+/// The longest length that is tried, in units of the travel.
 const LONGEST: f64 = 1.5;
-/// Sizes that are tried, in units of the contrasts' rms.
-const SIZES: usize = 36;
-const SMALLEST: f64 = 1e-2;
-const LARGEST: f64 = 1e5;
 /// What rounding leaves of a mean-square error.
 const ROUNDING: f64 = 1e-16;
 
 /// Which of all lengths and sizes count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Extent {
-    /// Their mean.
+    /// Their mean square.
     Likely,
     /// The one that this share of all is beyond.
     AtMost(f64),
@@ -68,18 +66,26 @@ impl Between {
             .iter()
             .map(|it| DMatrix::identity(it.len(), it.len()))
             .collect();
-        for axis in Axis::ALL {
-            let own: Vec<usize> = (0..blocks.len())
-                .filter(|at| axis_of(blocks[*at].name) == axis)
-                .collect();
-            let judged: Vec<(usize, Judged)> = own
-                .into_iter()
-                .filter_map(|at| Some((at, Judged::new(&blocks[at], fit, shape)?)))
-                .collect();
-            for (at, found, own) in of_axis(&judged, extent) {
-                inside[at] = found;
-                alike[at] = own;
-            }
+        let judged: Vec<(usize, Judged)> = (0..blocks.len())
+            .filter_map(|at| Some((at, Judged::new(&blocks[at], fit, shape)?)))
+            .collect();
+        let lengths = Axis::ALL.map(|axis| lengths_of(axis, &judged));
+        let all: Vec<Vec<ByLength>> = judged
+            .iter()
+            .map(|(_, it)| {
+                let lengths = lengths[it.axis.index()].iter();
+                lengths.map(|length| it.by_length(*length)).collect()
+            })
+            .collect();
+        let seen = judged.iter().zip(&all).map(|((at, it), by_length)| Seen {
+            name: blocks[*at].name,
+            nodes: &it.own,
+            by_length,
+        });
+        let pooled = pooled::pooled(&seen.collect::<Vec<_>>());
+        for (((at, _), by_length), pooled) in judged.iter().zip(&all).zip(&pooled) {
+            inside[*at] = of_intervals(by_length, pooled, extent);
+            alike[*at] = correlations(by_length, pooled);
         }
         Self { inside, alike }
     }
@@ -131,55 +137,45 @@ impl Between {
     }
 }
 
-/// All lengths, weighted by what all functions of the axis say of them.
-fn of_axis(
-    judged: &[(usize, Judged)],
-    extent: Extent,
-) -> Vec<(usize, Vec<[f64; 3]>, DMatrix<f64>)> {
-    let step = judged
-        .iter()
-        .map(|it| it.1.step)
-        .fold(f64::INFINITY, f64::min);
-    let span = judged.iter().map(|it| it.1.span).fold(0.0, f64::max);
-    let longest = (LONGEST * span).max(2.0 * step);
-    let lengths = logarithmic(step, longest, LENGTHS);
-    let each: Vec<Vec<ByLength>> = lengths
-        .iter()
-        .map(|length| judged.iter().map(|it| it.1.by_length(*length)).collect())
-        .collect();
-    let likelihoods: Vec<f64> = each
-        .iter()
-        .map(|all| all.iter().map(|it| it.likelihood).sum())
-        .collect();
-    let weights = normalised(&likelihoods);
-    let inside = |number: usize| {
-        let intervals = each[0][number].squares.len();
-        let own = |at: usize, place: usize| {
-            let of_length = |(all, weight): (&Vec<ByLength>, &f64)| {
-                let it = &all[number];
-                let square = it.squares[at][place];
-                let sizes = it.sizes.clone().into_iter();
-                let weight = *weight;
-                sizes.map(move |(size, own)| (size + square, weight * own))
-            };
-            each.iter().zip(&weights).flat_map(of_length).collect()
+/// The lengths that are tried for functions of this axis.
+fn lengths_of(axis: Axis, judged: &[(usize, Judged)]) -> Vec<f64> {
+    let own = || judged.iter().map(|it| &it.1).filter(|it| it.axis == axis);
+    let step = own().map(|it| it.step).fold(f64::INFINITY, f64::min);
+    let span = own().map(|it| it.span).fold(0.0, f64::max);
+    logarithmic(step, (LONGEST * span).max(2.0 * step), LENGTHS)
+}
+
+/// What a function may be from its curve, at the [`INSIDE`] of each interval.
+fn of_intervals(by_length: &[ByLength], pooled: &Pooled, extent: Extent) -> Vec<[f64; 3]> {
+    let at = |interval: usize, place: usize| {
+        let of_length = |(it, weights): (&ByLength, &Vec<f64>)| {
+            let square = it.squares[interval][place];
+            let each = pooled.squares.iter().zip(weights.clone());
+            each.map(|(size, weight)| (size * square, weight))
+                .collect::<Vec<_>>()
         };
-        (0..intervals)
-            .map(|at| core::array::from_fn(|place| exp(0.5 * extent.of(own(at, place)))))
-            .collect()
+        let all = by_length.iter().zip(&pooled.weights);
+        extent.of(all.flat_map(of_length).collect()).sqrt()
     };
-    let alike = |number: usize| {
-        let terms = lengths.iter().zip(&weights);
-        let first = &judged[number].1;
-        let nothing = DMatrix::zeros(first.inside.len(), first.inside.len());
-        terms.fold(nothing, |sum, (length, weight)| {
-            sum + first.alike(*length) * *weight
-        })
-    };
-    let numbered = judged.iter().enumerate();
-    numbered
-        .map(|(number, (at, _))| (*at, inside(number), alike(number)))
+    (0..by_length[0].squares.len())
+        .map(|interval| core::array::from_fn(|place| at(interval, place)))
         .collect()
+}
+
+/// How alike it is in the middles of two intervals.
+fn correlations(by_length: &[ByLength], pooled: &Pooled) -> DMatrix<f64> {
+    let size = by_length[0].middles.nrows();
+    let of_length = |sum, (it, weights): (&ByLength, &Vec<f64>)| {
+        let each = pooled.squares.iter().zip(weights);
+        sum + &it.middles * each.map(|(size, weight)| size * weight).sum::<f64>()
+    };
+    let all = by_length.iter().zip(&pooled.weights);
+    let covariance = all.fold(DMatrix::zeros(size, size), of_length);
+    let own = covariance.map_diagonal(|it: f64| it.max(f64::MIN_POSITIVE).sqrt());
+    DMatrix::from_fn(size, size, |m, n| {
+        let alike = covariance[(m, n)] / (own[m] * own[n]);
+        if m == n { 1.0 } else { alike.clamp(-1.0, 1.0) }
+    })
 }
 
 impl Extent {
@@ -199,22 +195,27 @@ impl Extent {
     }
 }
 
-/// What a function says of one length.
+/// A function beside random ones of one length and of size 1.
 struct ByLength {
-    /// The logarithm of the length's likelihood.
-    likelihood: f64,
-    /// Of each size the logarithm of its square, and its weight.
-    sizes: Vec<(f64, f64)>,
-    /// For each interval the logarithm of the mean-square error at its [`INSIDE`] in units of the size's square.
+    /// Of each contrast, made independent of the others and its noise 1, the variance.
+    powers: DVector<f64>,
+    /// What the function's own is.
+    seen: DVector<f64>,
+    /// For each interval the mean-square error at its [`INSIDE`].
     squares: Vec<[f64; 3]>,
+    /// The covariance of the errors in the middles of the intervals.
+    middles: DMatrix<f64>,
 }
 
 /// One function, made ready to be compared with random ones.
 struct Judged {
+    axis: Axis,
     nodes: Vec<f64>,
     /// Contrasts × nodes.
     contrasts: DMatrix<f64>,
-    /// What they are of the function.
+    /// The function's values at the nodes.
+    own: DVector<f64>,
+    /// What the contrasts are of them.
     values: DVector<f64>,
     /// L⁻¹ of their noise's covariance LLᵀ.
     whitening: DMatrix<f64>,
@@ -236,8 +237,9 @@ impl Judged {
         let cofactor = DMatrix::from_fn(width, width, |i, j| {
             fit.cofactor[(block.first + i) * all + block.first + j]
         });
+        let own = &block.basis * own;
+        let values = &contrasts * &own;
         let of_contrasts = &contrasts * &block.basis;
-        let values = &of_contrasts * own;
         let noise = &of_contrasts * cofactor * of_contrasts.transpose();
         let jitter = noise.trace() * 1e-12;
         let size = noise.nrows();
@@ -250,6 +252,7 @@ impl Judged {
             })
         });
         Some(Self {
+            axis: block.axis(),
             inside: inside.collect(),
             step: nodes
                 .windows(2)
@@ -257,6 +260,7 @@ impl Judged {
                 .fold(f64::INFINITY, f64::min),
             span: nodes[count - 1] - nodes[0],
             nodes,
+            own,
             contrasts,
             values,
             whitening,
@@ -273,79 +277,31 @@ impl Judged {
         let turned = &self.whitening * &self.contrasts;
         let eigen = SymmetricEigen::new(&turned * &between * turned.transpose());
         let seen = eigen.eigenvectors.transpose() * (&self.whitening * &self.values);
-        let (likelihood, sizes) = self.sizes(&eigen.eigenvalues, &seen);
         let of_place = |(at, weights): &(f64, DVector<f64>)| {
             let near = DVector::from_fn(count, |i, _| alike(*at, self.nodes[i]));
             let square = 1.0 - 2.0 * weights.dot(&near) + weights.dot(&(&between * weights));
-            ln(square.max(ROUNDING))
+            square.max(ROUNDING)
         };
+        let squares = self.inside.iter().map(|it| it.each_ref().map(of_place));
         ByLength {
-            likelihood,
-            sizes,
-            squares: self
-                .inside
-                .iter()
-                .map(|it| it.each_ref().map(of_place))
-                .collect(),
+            powers: eigen.eigenvalues,
+            seen,
+            squares: squares.collect(),
+            middles: self.of_middles(&alike, &between),
         }
     }
 
-    /// The middles of the intervals, with each node's weight there.
-    fn middles(&self) -> Vec<&(f64, DVector<f64>)> {
-        self.inside.iter().map(|[_, middle, _]| middle).collect()
-    }
-
-    /// The correlations of how far the function is from its curve in the middles of two intervals, for this
-    /// length.
-    fn alike(&self, length: f64) -> DMatrix<f64> {
-        let near = |a: f64, b: f64| {
-            let d = (a - b) / length;
-            exp(-0.5 * d * d)
-        };
-        let all = self.middles();
+    /// The covariance of how far a function of size 1 is from its curve in the middles of the intervals;
+    /// `between`: that of the nodes.
+    fn of_middles(&self, alike: &dyn Fn(f64, f64) -> f64, between: &DMatrix<f64>) -> DMatrix<f64> {
+        let all: Vec<&(f64, DVector<f64>)> =
+            self.inside.iter().map(|[_, middle, _]| middle).collect();
         let (nodes, middles) = (self.nodes.len(), all.len());
-        let between = DMatrix::from_fn(nodes, nodes, |i, j| near(self.nodes[i], self.nodes[j]));
-        let to_nodes = DMatrix::from_fn(middles, nodes, |m, i| near(all[m].0, self.nodes[i]));
+        let to_nodes = DMatrix::from_fn(middles, nodes, |m, i| alike(all[m].0, self.nodes[i]));
         let weights = DMatrix::from_fn(middles, nodes, |m, i| all[m].1[i]);
-        let own = DMatrix::from_fn(middles, middles, |m, n| near(all[m].0, all[n].0));
+        let own = DMatrix::from_fn(middles, middles, |m, n| alike(all[m].0, all[n].0));
         let crossed = &weights * to_nodes.transpose();
-        let error = own - &crossed - crossed.transpose() + &weights * between * weights.transpose();
-        let size: Vec<f64> = error
-            .diagonal()
-            .iter()
-            .map(|it| it.max(ROUNDING).sqrt())
-            .collect();
-        DMatrix::from_fn(middles, middles, |m, n| {
-            let own = error[(m, n)] / (size[m] * size[n]);
-            if m == n { 1.0 } else { own.clamp(-1.0, 1.0) }
-        })
-    }
-
-    /// The logarithm of the likelihood over all sizes, and of each size that of its square, with its weight.
-    fn sizes(&self, powers: &DVector<f64>, seen: &DVector<f64>) -> (f64, Vec<(f64, f64)>) {
-        let rms = (self.values.norm_squared() / self.values.len() as f64).sqrt();
-        let sizes = logarithmic(SMALLEST, LARGEST, SIZES);
-        let sizes: Vec<f64> = sizes
-            .iter()
-            .map(|it| it * rms.max(f64::MIN_POSITIVE))
-            .collect();
-        let likelihood = |size: &f64| {
-            let each = powers.iter().zip(seen.iter());
-            let terms = each.map(|(power, seen)| {
-                let variance = 1.0 + size * size * power.max(0.0);
-                ln(variance) + seen * seen / variance
-            });
-            -0.5 * terms.sum::<f64>()
-        };
-        let likelihoods: Vec<f64> = sizes.iter().map(likelihood).collect();
-        let most = likelihoods
-            .iter()
-            .copied()
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mean = likelihoods.iter().map(|it| exp(it - most)).sum::<f64>() / SIZES as f64;
-        let weights = normalised(&likelihoods);
-        let squares = sizes.iter().map(|size| 2.0 * ln(*size)).zip(weights);
-        (most + ln(mean), squares.collect())
+        own - &crossed - crossed.transpose() + &weights * between * weights.transpose()
     }
 }
 
@@ -364,12 +320,4 @@ fn logarithmic(low: f64, high: f64, count: usize) -> Vec<f64> {
     let (from, to) = (ln(low), ln(high));
     let at = |n: usize| exp(from + (to - from) * n as f64 / (count - 1) as f64);
     (0..count).map(at).collect()
-}
-
-/// Shares of a whole, by their logarithms.
-fn normalised(logs: &[f64]) -> Vec<f64> {
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let each: Vec<f64> = logs.iter().map(|it| exp(it - most)).collect();
-    let sum: f64 = each.iter().sum();
-    each.into_iter().map(|it| it / sum).collect()
 }

@@ -13,6 +13,8 @@
 
 use units::{Celsius, Metres};
 
+use std::collections::BTreeMap;
+
 use super::between::Extent;
 use super::design::{Design, between_square, error_row};
 use super::heat::add_heat;
@@ -23,6 +25,8 @@ use crate::uncertainty::{propagate, rms};
 
 /// One error of the instrument, which all readings have.
 const IN_COMMON: &str = "scale and air of the instrument, common to all lines";
+/// One error of a detector, which all readings of its run have.
+const IN_RUNS: &str = "scale of detectors, common to each line";
 /// What functions do between their nodes where they were read.
 const WHERE_READ: &str = "between nodes, where read";
 /// Readings that scatter more than was stated of them.
@@ -88,6 +92,8 @@ struct Parts {
     numbers: Vec<usize>,
     /// By reading, what one error of the instrument makes of it in units of its own uncertainty.
     common: Vec<f64>,
+    /// Likewise one error of the detector of its run, by that run.
+    of_runs: Vec<(usize, f64)>,
 }
 
 impl Parts {
@@ -115,6 +121,11 @@ impl Parts {
             numbers,
             heat,
             common: design.common(observations),
+            of_runs: observations
+                .iter()
+                .map(|it| it.run)
+                .zip(design.common_of_runs(observations))
+                .collect(),
             design,
             fit,
         }
@@ -122,7 +133,7 @@ impl Parts {
 
     /// By contribution the variance at a place, over all three directions.
     fn squares(&self, plan: &Plan, (at, tool): ToolAt, above: &[f64]) -> Vec<f64> {
-        let mut squares = vec![0.0; self.names.len() + 5];
+        let mut squares = vec![0.0; self.names.len() + 6];
         for axis in Axis::ALL {
             let (readings, others) = squares.split_at_mut(self.names.len());
             let blocks = &self.design.blocks;
@@ -141,13 +152,24 @@ impl Parts {
                 effect.moved[axis.index()]
             });
             let in_common: f64 = own.iter().zip(&self.common).map(|(a, b)| a * b).sum();
-            others[0] += whole - square(&own) - in_common * in_common;
+            let in_runs = self.in_runs(&own);
+            others[0] += whole - square(&own) - in_common * in_common - in_runs;
             others[1] += (self.enlarged * self.enlarged - 1.0) * whole;
             others[2] += propagate(&row, &self.heat);
             others[3] += at_the_place;
             others[4] += in_common * in_common;
+            others[5] += in_runs;
         }
         squares
+    }
+
+    /// The variance that errors of the detectors of runs make, by what each reading does.
+    fn in_runs(&self, own: &[f64]) -> f64 {
+        let mut by_run = BTreeMap::new();
+        for (own, (run, of_run)) in own.iter().zip(&self.of_runs) {
+            *by_run.entry(*run).or_insert(0.0) += own * of_run;
+        }
+        by_run.into_values().map(|it: f64| it * it).sum()
     }
 
     /// What one whitened reading more does to what `row` sees of the errors.
@@ -178,7 +200,7 @@ impl Parts {
         let of_readings = self.names.iter().enumerate().map(|(number, name)| {
             let own = observations.iter().zip(&self.numbers);
             let own = own.filter(|it| *it.1 == number).map(|it| it.0);
-            // Without what it has in common with all others.
+            // Without what it has in common with others.
             let u = own.clone().map(Observation::u_by_itself);
             let u: Vec<f64> = u.collect();
             let mut own = own.map(|it| it.reading);
@@ -212,6 +234,7 @@ impl Parts {
             ),
             shared(BETWEEN, 3, Correlation::BetweenPositions),
             shared(IN_COMMON, 4, Correlation::CommonScale),
+            shared(IN_RUNS, 5, Correlation::CommonScale),
         ];
         of_readings.chain(others).collect()
     }

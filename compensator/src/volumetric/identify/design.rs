@@ -76,7 +76,8 @@ impl Design {
             }
             Reading::Angle { deviation, u, .. } => deviation.is_finite() && u.value() > 0.0,
         };
-        let reading = reading && it.common.abs() < u_of(it.reading);
+        let u = u_of(it.reading);
+        let reading = reading && it.shared_square() < u * u;
         let mut numbers = it.at.array().into_iter().chain(it.tool.array());
         if !(reading && numbers.all(f64::is_finite)) {
             return Err(IdentifyError::NotUsable { index });
@@ -191,9 +192,13 @@ impl Design {
             between.add_shared(number, block, &read, &mut covariance);
         }
         let common = self.common(observations);
-        for (i, of_i) in common.iter().enumerate().filter(|it| *it.1 != 0.0) {
-            for (j, of_j) in common.iter().enumerate() {
-                covariance[(i, j)] += of_i * of_j;
+        let of_run = self.common_of_runs(observations);
+        for i in 0..count {
+            for j in 0..count {
+                covariance[(i, j)] += common[i] * common[j];
+                if observations[i].run == observations[j].run {
+                    covariance[(i, j)] += of_run[i] * of_run[j];
+                }
             }
         }
         covariance
@@ -203,6 +208,12 @@ impl Design {
     pub(super) fn common(&self, observations: &[Observation]) -> Vec<f64> {
         let each = observations.iter().zip(self.whitening.own());
         each.map(|(it, u)| it.common / u).collect()
+    }
+
+    /// Likewise one error of the detector of its run.
+    pub(super) fn common_of_runs(&self, observations: &[Observation]) -> Vec<f64> {
+        let each = observations.iter().zip(self.whitening.own());
+        each.map(|(it, u)| it.common_of_run / u).collect()
     }
 }
 

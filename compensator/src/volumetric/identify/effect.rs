@@ -31,10 +31,15 @@ pub(super) fn seen(reading: Reading, effect: &Effect) -> f64 {
 }
 
 impl Observation {
-    /// Its standard uncertainty without what all readings have in common, in its SI unit.
+    /// Its standard uncertainty without what it has in common with others, in its SI unit.
     pub(super) fn u_by_itself(&self) -> f64 {
         let u = u_of(self.reading);
-        (u * u - self.common * self.common).sqrt()
+        (u * u - self.shared_square()).sqrt()
+    }
+
+    /// The square of what it has in common with others, likewise.
+    pub(super) fn shared_square(&self) -> f64 {
+        self.common * self.common + self.common_of_run * self.common_of_run
     }
 }
 

@@ -30,7 +30,8 @@
 //! thermometers.
 //!
 //! What one error of the instrument does to all readings ([`Observation::common`]) is shared by them: what stretches every
-//! length alike makes the size of the volume uncertain, and no squareness.
+//! length alike makes the size of the volume uncertain, and no squareness. What the detector of one run does to all that
+//! it reads ([`Observation::common_of_run`]) is shared by these alone.
 //!
 //! Readings that scatter more than their stated uncertainties are reported
 //! ([`Identified::scattered`]), with those that fit least.
@@ -169,6 +170,7 @@ pub struct Alignment {
 ///         u: Metres::from_um(0.1),
 ///     },
 ///     common: 0.0,
+///     common_of_run: 0.0,
 /// };
 /// let readings = places.into_iter().zip([7.0, 8.0, 10.0]).map(read);
 /// let found = plan.identify(&readings.collect::<Vec<_>>())?;
@@ -234,6 +236,9 @@ pub struct Observation {
     /// What all readings have in common of its standard uncertainty, with the sign that one error of the instrument has
     /// here, in its SI unit: as scale and air stretch every length of a laser. 0 where nothing is.
     pub common: f64,
+    /// Likewise what all readings of its run have in common, and no others: as volts per millimetre stretch what a
+    /// detector reads along a line. 0 where nothing is.
+    pub common_of_run: f64,
 }
 
 /// What is unknown: the errors wanted, and what the instrument's settings leave open.

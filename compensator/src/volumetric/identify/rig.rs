@@ -209,6 +209,7 @@ impl Rig {
                     run,
                     reading: line.reading(value, u),
                     common,
+                    common_of_run: 0.0,
                 });
             }
         }

@@ -105,6 +105,7 @@ pub(super) fn measure(
                 run,
                 reading: line.reading(value + zero + u * chance.normal(), u),
                 common: 0.0,
+                common_of_run: 0.0,
             });
         }
     }

@@ -132,6 +132,7 @@ fn along_line(
             run,
             reading: reading(*at),
             common: 0.0,
+            common_of_run: 0.0,
         })
         .collect()
 }
@@ -173,6 +174,7 @@ fn everywhere(
                     run: runs.len(),
                     reading,
                     common: 0.0,
+                    common_of_run: 0.0,
                 });
             }
             runs.push(OFFSET);
@@ -389,6 +391,7 @@ fn face_diagonals_tell_the_squareness_in_closed_form_and_by_least_squares() {
                 run,
                 reading,
                 common: 0.0,
+                common_of_run: 0.0,
             });
         }
     }
@@ -445,6 +448,7 @@ fn a_square_tells_squareness_and_two_straightnesses() {
                 run,
                 reading,
                 common: 0.0,
+                common_of_run: 0.0,
             });
         }
     }
@@ -523,6 +527,7 @@ fn an_autocollimator_tells_tilts() {
                 u: Radians(1e-7),
             },
             common: 0.0,
+            common_of_run: 0.0,
         })
         .collect();
     let found = plan.identify(&observations).unwrap();
@@ -553,6 +558,7 @@ fn plans_and_readings_that_do_not_fit_are_refused_by_number() {
             run,
             reading,
             common: 0.0,
+            common_of_run: 0.0,
         }]
     };
     let (index, run, runs) = (0, 1, 1);

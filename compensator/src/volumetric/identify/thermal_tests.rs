@@ -115,6 +115,7 @@ impl Session {
                 run,
                 reading,
                 common: 0.0,
+                common_of_run: 0.0,
             });
         }
         let shown = warmth.map(|it| Celsius(it + noise * 0.03 * chance.normal()));
@@ -266,6 +267,7 @@ fn what_a_detector_saw_of_a_tilt_is_no_part_of_the_bend() {
                     run,
                     reading,
                     common: 0.0,
+                    common_of_run: 0.0,
                 });
             }
             session.runs.push(OFFSET);

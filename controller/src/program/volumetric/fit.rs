@@ -136,6 +136,7 @@ fn of_series(args: &VolumetricArgs, config: &VolumetricConfig) -> Result<Given, 
                 run: number,
                 reading: point.reading,
                 common: 0.0,
+                common_of_run: 0.0,
             };
             given
                 .readings

@@ -147,6 +147,7 @@ mod tests {
                 u: Metres::from_um(0.02),
             },
             common: 0.0,
+            common_of_run: 0.0,
         }
     }
 

@@ -100,6 +100,7 @@ impl Session<'_> {
                     u: Metres(u),
                 },
                 common: 0.0,
+                common_of_run: scale,
             }
         });
         Some(each.collect())
@@ -134,6 +135,7 @@ impl Session<'_> {
                     u: Radians(hypot(hypot(own, u_mean), scale)),
                 },
                 common: 0.0,
+                common_of_run: scale,
             }
         });
         Some(each.collect())

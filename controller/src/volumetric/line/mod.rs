@@ -90,6 +90,7 @@ impl LineReading {
             run,
             reading: self.reading,
             common: self.common,
+            common_of_run: 0.0,
         }
     }
 }
