@@ -6,6 +6,7 @@ use machine::Stage;
 use serde::{Deserialize, Serialize};
 use truestage::rotary::Way;
 use truestage::runs::Group;
+use truestage::volumetric::MemoryName;
 use utoipa::ToSchema;
 
 mod rows;
@@ -168,6 +169,11 @@ pub enum RunKind {
     Verify,
     /// Take down what the detectors of three axes read: from now on, a displacement is what has changed since.
     Reference,
+    /// Keep the state that the detectors of three axes see now as the one in which the machine was built: all later parts
+    /// are made with it.
+    FirstMemory,
+    /// Likewise as the state beyond that one.
+    SecondMemory,
     /// Follow a path of three axes, given in `path`.
     Path,
     /// The same as the first of several parts: what the detectors see meanwhile is not corrected but kept, so that all
@@ -179,11 +185,13 @@ pub enum RunKind {
 
 impl RunKind {
     /// All of them.
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Zero,
         Self::Calibrate,
         Self::Verify,
         Self::Reference,
+        Self::FirstMemory,
+        Self::SecondMemory,
         Self::Path,
         Self::FirstPart,
         Self::Job,
@@ -194,9 +202,12 @@ impl RunKind {
         match self {
             Self::Path | Self::FirstPart => group.follows_paths(),
             Self::Job => group.does_jobs(),
-            Self::Zero | Self::Calibrate | Self::Verify | Self::Reference => {
-                group.offered().contains(&self.stage())
-            }
+            Self::Zero
+            | Self::Calibrate
+            | Self::Verify
+            | Self::Reference
+            | Self::FirstMemory
+            | Self::SecondMemory => group.offered().contains(&self.stage()),
         }
     }
 
@@ -204,7 +215,12 @@ impl RunKind {
     pub(crate) const fn has_rows(self) -> bool {
         match self {
             Self::Path | Self::FirstPart | Self::Job => true,
-            Self::Zero | Self::Calibrate | Self::Verify | Self::Reference => false,
+            Self::Zero
+            | Self::Calibrate
+            | Self::Verify
+            | Self::Reference
+            | Self::FirstMemory
+            | Self::SecondMemory => false,
         }
     }
 
@@ -214,13 +230,22 @@ impl RunKind {
         value.as_str().unwrap_or_default().to_owned()
     }
 
+    /// What it keeps of three axes.
+    pub(crate) const fn memory(self) -> Option<MemoryName> {
+        match self {
+            Self::FirstMemory => Some(MemoryName::First),
+            Self::SecondMemory => Some(MemoryName::Second),
+            _ => None,
+        }
+    }
+
     /// What procedures call it.
     pub(crate) const fn stage(self) -> Stage {
         match self {
             Self::Zero => Stage::Zero,
             Self::Calibrate => Stage::Calibrate,
             Self::Verify => Stage::Verify,
-            Self::Reference => Stage::Reference,
+            Self::Reference | Self::FirstMemory | Self::SecondMemory => Stage::Reference,
             Self::Path | Self::FirstPart | Self::Job => Stage::Job,
         }
     }

@@ -43,6 +43,7 @@ pub(crate) trait Client {
     fn calibrations(&self) -> Vec<CalibrationView>;
     fn activate(&self, who: &Caller, id: &str) -> Result<ChosenView, Problem>;
     fn rollback(&self, who: &Caller, axis: &str) -> Result<ChosenView, Problem>;
+    fn clear(&self, who: &Caller, of: &str) -> Result<ChosenView, Problem>;
     fn axis(&self, name: &str) -> Result<AxisView, Problem>;
     fn machine(&self) -> MachineView;
     fn events(&self, after: u64) -> Vec<Event>;
@@ -180,6 +181,11 @@ impl Client for InProcess {
     fn rollback(&self, who: &Caller, axis: &str) -> Result<ChosenView, Problem> {
         let _passing = self.gate.pass();
         self.desk.rollback(who, axis)
+    }
+
+    fn clear(&self, who: &Caller, of: &str) -> Result<ChosenView, Problem> {
+        let _passing = self.gate.pass();
+        self.desk.clear(who, of)
     }
 
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {

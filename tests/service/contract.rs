@@ -7,6 +7,7 @@ mod jobs;
 mod jogs;
 mod kinds;
 mod machine;
+mod memories;
 mod motions;
 mod paused;
 pub(crate) mod questions;

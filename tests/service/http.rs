@@ -290,6 +290,11 @@ impl Client for Http {
         answer.read()
     }
 
+    fn clear(&self, who: &Caller, of: &str) -> Result<ChosenView, Problem> {
+        let answer = self.post(who, "/v1/calibrations/clear", "", &json!({"axis": of}));
+        answer.read()
+    }
+
     fn axis(&self, name: &str) -> Result<AxisView, Problem> {
         self.get(&format!("/v1/axes/{name}"))
     }

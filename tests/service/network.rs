@@ -206,7 +206,9 @@ fn each_role_may_do_its_own_and_what_those_before_it_may() {
             ("POST /v1/runs", run("verify"), 2),
             ("POST /v1/runs", run("calibrate"), 1),
             ("POST /v1/calibrations/0a/activate", Value::Null, 1),
+            ("POST /v1/runs", run("second_memory"), 1),
             ("POST /v1/calibrations/rollback", json!({"axis": "x"}), 1),
+            ("POST /v1/calibrations/clear", json!({"axis": "x"}), 1),
             // What is not there yet is for those who may do everything.
             ("POST /v1/anything", Value::Null, 1),
         ];

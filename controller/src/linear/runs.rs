@@ -29,6 +29,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     paths: None,
     jobs: Some(|machine| job_judge(machine.config().clone(), machine.config_hash().clone())),
     moves: None,
+    forgets: &[],
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {

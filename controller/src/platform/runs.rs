@@ -29,6 +29,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     paths: None,
     jobs: None,
     moves: Some(&MOVES),
+    forgets: &[],
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {

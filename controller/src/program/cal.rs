@@ -230,6 +230,7 @@ fn choose(path: &Path, choice: &Choice) -> Result<Vec<Change>, Failure> {
     let verb = match choice {
         Choice::Activate(_) => "cal activate",
         Choice::Rollback(_) => "cal rollback",
+        Choice::Clear(_) => "memory clear",
     };
     let _lease = Lease::take(&store, verb)?;
     let groups = groups(&loaded.config);

@@ -32,7 +32,7 @@ pub(crate) fn told(choice: &Choice, all: &[Used<'_>], output: Output) -> Ended {
         ([only], _) => json!({"axis": only.pointer, "active": only.id}),
         (all, choice) => {
             let name = match choice {
-                Choice::Rollback(name) => Some(name.as_str()),
+                Choice::Rollback(name) | Choice::Clear(name) => Some(name.as_str()),
                 Choice::Activate(_) => all.first().map(|it| it.pointer),
             };
             let active = all.iter().map(|it| (it.pointer.to_owned(), json!(it.id)));

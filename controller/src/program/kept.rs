@@ -61,11 +61,30 @@ impl Service {
 
     /// Takes down what the detectors of three axes read.
     pub(crate) fn reference(&self, machine: &MachineArgs, output: Output) -> Ended {
+        self.on_volume(json!({"axis": VOLUME}), machine, output)
+    }
+
+    /// Keeps the present state of three axes as a memory: `kind` is what the service calls that run.
+    pub(crate) fn remember(&self, kind: &str, machine: &MachineArgs, output: Output) -> Ended {
+        self.on_volume(json!({"kind": kind, "axis": VOLUME}), machine, output)
+    }
+
+    /// Forgets what is kept under this name of the store. Gives what that was.
+    pub(crate) fn clear(&self, of: &str) -> Result<Option<String>, Failure> {
+        let all = ask(&self.at, "GET", "/v1/calibrations", "")?;
+        let mut all = all.as_array().into_iter().flatten();
+        let used = all.find(|it| it["axis"] == of && it["active"] == true);
+        let before = used.and_then(|it| it["id"].as_str()).map(str::to_owned);
+        self.post_choice(&Choice::Clear(of.into()))?;
+        Ok(before)
+    }
+
+    /// A run that reads what the detectors of three axes see at stops.
+    fn on_volume(&self, request: Value, machine: &MachineArgs, output: Output) -> Ended {
         refuse(machine.record.is_some(), "--record")?;
         let stop = stop_request()?;
         self.zero_first(Some(VOLUME), &stop, output)?;
         let waiting = Waiting::of_nobody(&stop, output);
-        let request = json!({"axis": VOLUME});
         let run = self.run(Stage::Reference, request, None, waiting)?;
         tell(&run, output)
     }
@@ -88,14 +107,7 @@ impl Service {
 
     /// Uses another calibration from now on.
     pub(crate) fn choose(&self, choice: &Choice, output: Output) -> Ended {
-        let (path, body) = match choice {
-            Choice::Activate(id) => (
-                format!("/v1/calibrations/{}/activate", plain(id)),
-                json!({}),
-            ),
-            Choice::Rollback(axis) => ("/v1/calibrations/rollback".into(), json!({"axis": axis})),
-        };
-        let chosen = ask(&self.at, "POST", &path, &body.to_string())?;
+        let chosen = self.post_choice(choice)?;
         let changes = chosen["changes"].as_array().into_iter().flatten();
         let changes = changes.map(|it| Used {
             pointer: it["of"].as_str().unwrap_or_default(),
@@ -103,6 +115,18 @@ impl Service {
             is_earlier: it["is_earlier"] == true,
         });
         told(choice, &changes.collect::<Vec<_>>(), output)
+    }
+
+    fn post_choice(&self, choice: &Choice) -> Result<Value, Failure> {
+        let (path, body) = match choice {
+            Choice::Activate(id) => (
+                format!("/v1/calibrations/{}/activate", plain(id)),
+                json!({}),
+            ),
+            Choice::Rollback(axis) => ("/v1/calibrations/rollback".into(), json!({"axis": axis})),
+            Choice::Clear(of) => ("/v1/calibrations/clear".into(), json!({"axis": of})),
+        };
+        ask(&self.at, "POST", &path, &body.to_string())
     }
 
     /// What comes before a run that measures: options that are not offered are refused, and the axis has its zero.

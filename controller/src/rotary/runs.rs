@@ -33,6 +33,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     paths: None,
     jobs: None,
     moves: None,
+    forgets: &[],
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {

@@ -11,6 +11,8 @@ pub enum Choice {
     Activate(String),
     /// The one that was used before: of an axis, or of all that is called so and was made together.
     Rollback(String),
+    /// None any more, under this name of the store: of what a machine does without.
+    Clear(String),
 }
 
 impl Choice {
@@ -21,7 +23,7 @@ impl Choice {
                 let id = store.resolve(beginning)?;
                 Ok(store.glance(&id)?.head.axis)
             }
-            Self::Rollback(name) => Ok(name.clone()),
+            Self::Rollback(name) | Self::Clear(name) => Ok(name.clone()),
         }
     }
 }
@@ -88,6 +90,7 @@ pub(super) fn chosen_among(
                 is_earlier: false,
             }])
         }
+        Choice::Clear(name) => Ok(vec![Change::to_nothing(name)]),
         Choice::Rollback(name) if pointers.contains(name) => Ok(vec![Change::back(store, name)?]),
         // All of them, or none.
         Choice::Rollback(_) => {

@@ -77,6 +77,8 @@ pub(crate) struct GroupRuns {
     pub(crate) jobs: Option<MakesJobJudge>,
     /// How it is moved as one, where it is.
     pub(crate) moves: Option<&'static GroupMoves>,
+    /// What it works without, too, as the store calls it.
+    pub(crate) forgets: &'static [&'static str],
 }
 
 /// Makes who judges paths.
@@ -223,8 +225,25 @@ impl Group {
     /// # Errors
     /// When there is no such calibration, none before, or it does not go with the others in use.
     pub(crate) fn changes(&self, store: &Store, choice: &Choice) -> Result<Vec<Change>, Failure> {
+        self.require_does_without(choice)?;
         let chosen = chosen_among(&self.pointers, store, choice)?;
         (self.runs.with_companions)(store, chosen)
+    }
+
+    fn require_does_without(&self, choice: &Choice) -> Result<(), Failure> {
+        let Choice::Clear(name) = choice else {
+            return Ok(());
+        };
+        if self.runs.forgets.contains(&name.as_str()) {
+            return Ok(());
+        }
+        Err(Failure::Usage {
+            what: format!("{name} is no state that was kept on purpose, and is not forgotten"),
+            help: match self.runs.forgets {
+                [] => "go back to the one before it: `cal rollback`".into(),
+                all => format!("clear one of {}", all.join(", ")),
+            },
+        })
     }
 
     /// Uses what `choice` says from now on, now and after the next start; says what that changed. Nothing moves: the

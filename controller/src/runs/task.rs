@@ -14,6 +14,7 @@ use super::teller::{Teller, Told};
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::run::CalibrateOptions;
+use crate::volumetric::MemoryName;
 
 /// A run that is to be done.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,8 @@ pub struct Task {
     pub path: Option<JudgedPath>,
     /// What the detectors see along the path is not corrected, but kept for the parts that follow.
     pub first_part: bool,
+    /// References: the present state is kept as this memory instead, and all later parts are made with it.
+    pub memory: Option<MemoryName>,
     /// The job that is done, where it is one.
     pub job: Option<JudgedJob>,
 }
@@ -53,6 +56,7 @@ impl Task {
             warm_up_min: None,
             path: None,
             first_part: false,
+            memory: None,
             job: None,
         }
     }

@@ -18,7 +18,7 @@ use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::chosen;
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::motion::{MOVES, require_measured};
-use crate::volumetric::{GEOMETRY, VerifyBy, VolumetricTeller, WarmUp};
+use crate::volumetric::{GEOMETRY, MemoryName, VerifyBy, VolumetricTeller, WarmUp, memory_pointer};
 
 /// What the three axes are called together.
 const WHOLE: &str = "volume";
@@ -43,6 +43,10 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     paths: Some(paths),
     jobs: None,
     moves: Some(&MOVES),
+    forgets: &[
+        memory_pointer(MemoryName::First),
+        memory_pointer(MemoryName::Second),
+    ],
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {
@@ -135,7 +139,10 @@ fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
         Stage::Job => follow(work, task),
         Stage::Calibrate => calibrate(work, task),
         Stage::Verify => verify(work, task),
-        Stage::Reference => reference(work),
+        Stage::Reference => match task.memory {
+            None => reference(work),
+            Some(memory) => remember(work, memory),
+        },
     }
 }
 
@@ -246,6 +253,19 @@ fn reference(work: Work<'_>) -> Result<Found, Failure> {
     Ok(Found {
         figures: json!({"references": taken.id, "geometry": taken.references.content.geometry}),
         told: words.map(|it| (it.referenced)(&taken)),
+        ..Found::default()
+    })
+}
+
+/// Keeps the present state, in which all later parts are made.
+fn remember(work: Work<'_>, memory: MemoryName) -> Result<Found, Failure> {
+    let words = work.words::<VolumetricTeller>();
+    let mut volume = work.machine.volumetric()?;
+    volume.check_memory(work.store, memory)?;
+    let kept = volume.record_memory(work.store, memory)?;
+    Ok(Found {
+        figures: json!({"memory": kept.id, "foreign_second": kept.foreign}),
+        told: words.map(|it| (it.remembered)(&kept)),
         ..Found::default()
     })
 }

@@ -20,6 +20,8 @@ pub struct VolumetricTeller {
     pub verified: fn(verified: &VolumetricVerified) -> Told,
     /// References that were taken.
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
+    /// A state that is kept.
+    pub remembered: fn(kept: &Remembered) -> Told,
     /// A corrected move that was made.
     pub moved: fn(moved: &VolumetricMoved) -> Told,
     /// A path that was followed, what joined its rows, and what later parts are made with when it was the first.

@@ -36,7 +36,12 @@ impl Desk {
         match request.kind {
             RunKind::Path | RunKind::FirstPart => self.judge_path(request).map(Some),
             RunKind::Job => self.judge_job(request).map(Some),
-            RunKind::Zero | RunKind::Calibrate | RunKind::Verify | RunKind::Reference => Ok(None),
+            RunKind::Zero
+            | RunKind::Calibrate
+            | RunKind::Verify
+            | RunKind::Reference
+            | RunKind::FirstMemory
+            | RunKind::SecondMemory => Ok(None),
         }
     }
 

@@ -55,6 +55,15 @@ impl Desk {
         self.choose(caller, Choice::Rollback(axis.to_owned()))
     }
 
+    /// Uses nothing any more of what the store calls `of`: `volume-first-memory` or `volume-second-memory`, with what counts
+    /// from it. Nothing moves.
+    ///
+    /// # Errors
+    /// When a machine does not do without it, or an axis is in use.
+    pub fn clear(&self, caller: &Caller, of: &str) -> Result<ChosenView, Problem> {
+        self.choose(caller, Choice::Clear(of.to_owned()))
+    }
+
     fn choose(&self, caller: &Caller, choice: Choice) -> Result<ChosenView, Problem> {
         let answer = self.give(caller, Order::Calibration(choice))?.wait()?;
         self.chosen(answer)

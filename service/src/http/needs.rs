@@ -28,8 +28,12 @@ pub(super) fn needed(method: &Method, path: &str) -> Role {
 pub(super) const fn of_run(kind: RunKind) -> Role {
     match kind {
         RunKind::Zero | RunKind::Verify | RunKind::Path | RunKind::Job => Role::Operator,
-        // What a first part leaves is kept for all later ones.
-        RunKind::Calibrate | RunKind::Reference | RunKind::FirstPart => Role::Commissioner,
+        // What a first part or a memory leaves is kept for all later parts.
+        RunKind::Calibrate
+        | RunKind::Reference
+        | RunKind::FirstMemory
+        | RunKind::SecondMemory
+        | RunKind::FirstPart => Role::Commissioner,
     }
 }
 

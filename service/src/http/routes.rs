@@ -79,6 +79,7 @@ fn routed() -> (Router<State>, OpenApi) {
         .routes(routes!(calibrations::calibrations))
         .routes(routes!(calibrations::activate))
         .routes(routes!(calibrations::rollback))
+        .routes(routes!(calibrations::clear))
         .routes(routes!(runs::runs, runs::plan))
         .routes(routes!(runs::run))
         .routes(routes!(runs::start))

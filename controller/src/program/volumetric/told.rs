@@ -14,6 +14,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         text: verbs::verified_text(verified),
         value: verbs::verified_value(verified),
     },
+    remembered: part::remembered,
     moved: moved::moved,
     followed: part::followed,
     referenced: |taken| Told {

@@ -74,6 +74,31 @@ pub(super) async fn rollback(
     choose(&state.desk, &caller, Choice::Rollback(plain(&request.axis))).await
 }
 
+/// What is forgotten.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ClearRequest {
+    /// `volume-first-memory` or `volume-second-memory`.
+    axis: String,
+}
+
+/// Uses a state memory of three axes no longer, nor what counts from it. Nothing moves.
+#[utoipa::path(
+    post, path = "/calibrations/clear", tag = "calibrations", request_body = ClearRequest, params(Asks),
+    responses(
+        (status = 200, description = "What is used now, and by which axes", body = ChosenView),
+        (status = "4XX", description = "Refused; what was used is used still", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn clear(
+    Of(state): Of<State>,
+    By(caller): By,
+    Body(request): Body<ClearRequest>,
+) -> Result<Json<ChosenView>, Problem> {
+    choose(&state.desk, &caller, Choice::Clear(plain(&request.axis))).await
+}
+
 async fn choose(desk: &Desk, caller: &Caller, choice: Choice) -> Result<Json<ChosenView>, Problem> {
     let answer = obey(desk, caller, Order::Calibration(choice)).await?;
     desk.chosen(answer).map(Json)

@@ -42,6 +42,7 @@ impl Task {
             verify: self.request.verify,
             uncompensated: self.request.uncompensated,
             warm_up_min: self.request.warm_up_min,
+            memory: self.request.kind.memory(),
             first_part: self.request.kind == RunKind::FirstPart,
             path: match &self.judged {
                 Some(Judged::Path { path, .. }) => Some(path.clone()),
