@@ -331,7 +331,7 @@ fn three_axes_are_calibrated_and_verified_by_one_command_that_says_so_in_text_js
     }
 }
 
-/// Through a service paths are followed and refused as without one, and calibrations are chosen.
+/// Through a service paths are followed and refused as without one, states kept, and calibrations chosen.
 fn kept(live: &Live, geometry: &Value, departure: &Value) {
     let words = ["serve", "machine.toml", "--listen", "unix:truestage.sock"];
     let mut service = Process::start(&mut live.command(&words));
@@ -341,6 +341,7 @@ fn kept(live: &Live, geometry: &Value, departure: &Value) {
         answers && live.run_nowhere(&["status"]).code == Some(0)
     });
     assert_eq!(&follows(live), departure);
+    remembers(live);
     let id = text(geometry);
     let chosen = live.run_nowhere(&["cal", "activate", "machine.toml", &id[..12]]);
     let chosen = chosen.with_code(0);
