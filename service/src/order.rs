@@ -113,7 +113,7 @@ pub(crate) enum Answer {
     /// The motion that a jog is.
     Named(String),
     /// What is used from now on, and by which axes.
-    Chosen(Vec<Change>, Vec<String>),
+    Chosen(Vec<Change>, Vec<String>, Option<String>),
     /// The lease.
     Leased(Leased),
 }

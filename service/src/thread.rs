@@ -317,11 +317,11 @@ impl Kept {
         let group = Group::chosen(&groups, &self.store, choice)?;
         self.keeper.borrow().require_all_free(group)?;
         let changes = group.choose(&mut self.machine, &self.store, choice)?;
-        self.load_group(group);
+        let warning = self.load_group(group);
         let mut keeper = self.keeper.borrow_mut();
         keeper.plan_anew(&mut self.machine);
         keeper.chosen(&self.machine, group, &changes, by);
-        Ok(Answer::Chosen(changes, group.axes.clone()))
+        Ok(Answer::Chosen(changes, group.axes.clone(), warning))
     }
 
     /// Uses the active calibration of each axis, and says where one cannot be used; what runs would do depends on
@@ -329,12 +329,13 @@ impl Kept {
     fn load_courses(&mut self) {
         let groups = self.keeper.borrow().groups();
         for group in groups {
-            self.load_group(&group);
+            drop(self.load_group(&group));
         }
         self.keeper.borrow_mut().plan_anew(&mut self.machine);
     }
 
-    fn load_group(&mut self, group: &Group) {
+    /// Uses what is in use of `group`; says why that cannot be used, where it cannot.
+    fn load_group(&mut self, group: &Group) -> Option<String> {
         if !group.parts.is_empty() {
             let judge = group.judge(&mut self.machine, &self.store);
             let mut keeper = self.keeper.borrow_mut();
@@ -349,10 +350,10 @@ impl Kept {
             let id = id.and_then(|it| it.1.as_deref());
             self.set_mechanics(axis, id);
         }
-        if let Some(failure) = warning {
-            let what = format!("{}: its calibration is not used: {failure}", called(group));
-            self.keeper.borrow_mut().warn(&what);
-        }
+        let failure = warning?;
+        let what = format!("{}: its calibration is not used: {failure}", called(group));
+        self.keeper.borrow_mut().warn(&what);
+        Some(what)
     }
 
     fn set_mechanics(&mut self, axis: &str, id: Option<&str>) {

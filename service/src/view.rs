@@ -339,7 +339,7 @@ pub struct RunView {
     pub id: String,
     /// Who asked for it.
     pub by: String,
-    /// What it is: `zero`, `calibrate`, `verify`, `reference` or `path`.
+    /// What it is.
     pub kind: crate::request::RunKind,
     /// What is run: an axis, `platform` or `volume`.
     #[serde(default)]

@@ -418,6 +418,18 @@ fn remembers(live: &Live) {
     assert_eq!(axes.len(), 3, "{kept}");
     let cleared = live.run(&["memory", "clear", "machine.toml"]).with_code(0);
     assert_eq!(cleared["cleared"], kept["memory"]);
+    for which in ["first", "second"] {
+        live.run(&["memory", "record", "machine.toml", "--memory", which])
+            .with_code(0);
+    }
+    let words = ["memory", "clear", "machine.toml", "--memory", "first"];
+    let cleared = live.run(&words).with_code(0);
+    let foreign = text(&cleared["foreign_second"]).to_owned();
+    let cleared = live.run(&["memory", "clear", "machine.toml"]).with_code(0);
+    assert_eq!(
+        (&cleared["cleared"], &cleared["foreign_second"]),
+        (&foreign.into(), &Value::Null)
+    );
 }
 
 fn moves(live: &Live) {

@@ -6,6 +6,7 @@
 mod calibrated;
 mod heard;
 mod jobs;
+mod memories;
 mod motions;
 mod reset;
 
@@ -62,21 +63,6 @@ impl Service {
     /// Takes down what the detectors of three axes read.
     pub(crate) fn reference(&self, machine: &MachineArgs, output: Output) -> Ended {
         self.on_volume(json!({"axis": VOLUME}), machine, output)
-    }
-
-    /// Keeps the present state of three axes as a memory: `kind` is what the service calls that run.
-    pub(crate) fn remember(&self, kind: &str, machine: &MachineArgs, output: Output) -> Ended {
-        self.on_volume(json!({"kind": kind, "axis": VOLUME}), machine, output)
-    }
-
-    /// Forgets what is kept under this name of the store. Gives what that was.
-    pub(crate) fn clear(&self, of: &str) -> Result<Option<String>, Failure> {
-        let all = ask(&self.at, "GET", "/v1/calibrations", "")?;
-        let mut all = all.as_array().into_iter().flatten();
-        let used = all.find(|it| it["axis"] == of && it["active"] == true);
-        let before = used.and_then(|it| it["id"].as_str()).map(str::to_owned);
-        self.post_choice(&Choice::Clear(of.into()))?;
-        Ok(before)
     }
 
     /// A run that reads what the detectors of three axes see at stops.

@@ -468,15 +468,9 @@ fn done(
         Command::Reference(args) => volumetric::reference::run(&args, output),
         Command::Align(args) => align::run(&args, output),
         Command::Run(args) => run::run(args, output),
-        Command::Memory(MemoryCommand::Record(args)) => {
-            volumetric::part::memory_record(&args, output)
-        }
-        Command::Memory(MemoryCommand::Import(args)) => {
-            volumetric::part::memory_import(&args, output)
-        }
-        Command::Memory(MemoryCommand::Clear(args)) => {
-            volumetric::part::memory_clear(&args, output)
-        }
+        Command::Memory(MemoryCommand::Record(args)) => volumetric::memory::record(&args, output),
+        Command::Memory(MemoryCommand::Import(args)) => volumetric::memory::import(&args, output),
+        Command::Memory(MemoryCommand::Clear(args)) => volumetric::memory::clear(&args, output),
         Command::Cal(command) => cal::run(&command, output),
         Command::Fit(command) => data::fit(&command, output),
         Command::Plan(command) => data::plan(&command, output),

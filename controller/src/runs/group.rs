@@ -225,16 +225,16 @@ impl Group {
     /// # Errors
     /// When there is no such calibration, none before, or it does not go with the others in use.
     pub(crate) fn changes(&self, store: &Store, choice: &Choice) -> Result<Vec<Change>, Failure> {
-        self.require_does_without(choice)?;
         let chosen = chosen_among(&self.pointers, store, choice)?;
+        if let Choice::Clear(name) = choice {
+            // What counted from it stays: whoever wants it no longer either says so.
+            return self.require_does_without(name).map(|()| chosen);
+        }
         (self.runs.with_companions)(store, chosen)
     }
 
-    fn require_does_without(&self, choice: &Choice) -> Result<(), Failure> {
-        let Choice::Clear(name) = choice else {
-            return Ok(());
-        };
-        if self.runs.forgets.contains(&name.as_str()) {
+    fn require_does_without(&self, name: &str) -> Result<(), Failure> {
+        if self.runs.forgets.contains(&name) {
             return Ok(());
         }
         Err(Failure::Usage {
@@ -258,6 +258,11 @@ impl Group {
         choice: &Choice,
     ) -> Result<Vec<Change>, Failure> {
         let changes = self.changes(store, choice)?;
+        if matches!(choice, Choice::Clear(_)) {
+            // Without it the others may be of no use: that is said when they are loaded.
+            write(store, &changes)?;
+            return Ok(changes);
+        }
         (self.runs.usable)(machine, store, &changes)?;
         write(store, &changes)?;
         self.load(machine, store)?;

@@ -55,8 +55,8 @@ impl Desk {
         self.choose(caller, Choice::Rollback(axis.to_owned()))
     }
 
-    /// Uses nothing any more of what the store calls `of`: `volume-first-memory` or `volume-second-memory`, with what counts
-    /// from it. Nothing moves.
+    /// Uses nothing any more of what the store calls `of`: `volume-first-memory` or `volume-second-memory`. What counted from
+    /// it stays in use, and nothing is corrected until that is recorded again or cleared, too. Nothing moves.
     ///
     /// # Errors
     /// When a machine does not do without it, or an axis is in use.
@@ -71,13 +71,14 @@ impl Desk {
 
     /// What an order for another calibration came to.
     pub(crate) fn chosen(&self, answer: Answer) -> Result<ChosenView, Problem> {
-        let Answer::Chosen(changes, axes) = answer else {
+        let Answer::Chosen(changes, axes, warning) = answer else {
             return Err(Problem::new(Code::Ending, "nothing was chosen", ""));
         };
         let axes = axes.iter().map(|it| self.axis(it));
         Ok(ChosenView {
             changes: changes.into_iter().map(ChangeView::from).collect(),
             axes: axes.collect::<Result<_, _>>()?,
+            warning,
         })
     }
 }

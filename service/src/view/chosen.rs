@@ -32,6 +32,8 @@ pub struct ChosenView {
     pub changes: Vec<ChangeView>,
     /// The axes that are corrected by it.
     pub axes: Vec<AxisView>,
+    /// Why they are not, where they are not.
+    pub warning: Option<String>,
 }
 
 /// What one of the calibrations in use is from now on.

@@ -171,7 +171,12 @@ fn correlations(by_length: &[ByLength], pooled: &Pooled) -> DMatrix<f64> {
     };
     let all = by_length.iter().zip(&pooled.weights);
     let covariance = all.fold(DMatrix::zeros(size, size), of_length);
-    let own = covariance.map_diagonal(|it: f64| it.max(f64::MIN_POSITIVE).sqrt());
+    let squares = pooled
+        .weights
+        .iter()
+        .flat_map(|it| it.iter().zip(&pooled.squares));
+    let least = ROUNDING * squares.map(|(weight, size)| weight * size).sum::<f64>();
+    let own = covariance.map_diagonal(|it: f64| it.max(least).sqrt());
     DMatrix::from_fn(size, size, |m, n| {
         let alike = covariance[(m, n)] / (own[m] * own[n]);
         if m == n { 1.0 } else { alike.clamp(-1.0, 1.0) }

@@ -2,7 +2,8 @@
 //!
 //! The errors found are linear in the readings, so that the variance of the tool's deviation is a sum over them
 //! (GUM 5.1): what each reading has by itself, by where it comes from; what functions do between their nodes
-//! where they were read, and an error of the instrument that all of them have, which readings share; what the readings scatter more than was stated (Birge's ratio);
+//! where they were read, an error of the instrument that all of them have, and those of detectors that all readings of a
+//! run have, which readings share; what the readings scatter more than was stated (Birge's ratio);
 //! the thermometers; and what functions do between their nodes at the place itself.
 //!
 //! | symbol | name here |
@@ -234,7 +235,7 @@ impl Parts {
             ),
             shared(BETWEEN, 3, Correlation::BetweenPositions),
             shared(IN_COMMON, 4, Correlation::CommonScale),
-            shared(IN_RUNS, 5, Correlation::CommonScale),
+            shared(IN_RUNS, 5, Correlation::SharedReadings),
         ];
         of_readings.chain(others).collect()
     }

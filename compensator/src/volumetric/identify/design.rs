@@ -176,7 +176,7 @@ impl Design {
     }
 
     /// The covariance of what readings share, in units of their own uncertainties: what the functions do between their
-    /// nodes, and an error of the instrument that all of them have.
+    /// nodes, an error of the instrument that all of them have, and those of detectors that all readings of a run have.
     fn shared(&self, plan: &Plan, observations: &[Observation]) -> DMatrix<f64> {
         let count = observations.len();
         let mut covariance = DMatrix::zeros(count, count);

@@ -46,7 +46,7 @@ impl Whitening {
         let whole = DMatrix::identity(count, count) * own + shared;
         let factor = whole
             .cholesky()
-            .expect("it is no smaller than the identity");
+            .expect("what rounding takes from it was added");
         self.factor = Some(factor.unpack());
     }
 

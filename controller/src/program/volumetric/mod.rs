@@ -5,6 +5,7 @@ mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;
 mod intended;
+pub(crate) mod memory;
 pub(crate) mod memory_args;
 pub(crate) mod moved;
 pub(crate) mod part;

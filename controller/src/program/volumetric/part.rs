@@ -1,5 +1,4 @@
-//! Parts: a path of three axes that is followed, what the correction said along it, and the state
-//! that later parts are to be made with.
+//! Parts: a path of three axes that is followed, and what the correction said along it.
 
 use std::path::Path;
 
@@ -12,20 +11,18 @@ use units::Metres;
 use crate::config;
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::data_file::volume_head_of;
-use crate::program::data_text::{name_of, read};
+use crate::program::data_text::read;
 use crate::program::intended::nowhere;
 use crate::program::kept::or_by_its_service;
 use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
-use crate::program::volumetric::memory_args::{ImportArgs, MemoryArgs};
-use crate::program::volumetric::verbs::{with_zeroed_volume, zeroed_volume};
+use crate::program::volumetric::memory::{kept_text, kept_value};
+use crate::program::volumetric::verbs::zeroed_volume;
 use crate::runs::Told;
-use crate::volumetric::MemoryName;
 use crate::volumetric::first_part::FirstPart;
 use crate::volumetric::motion::require_measured;
 use crate::volumetric::path::{CorrectedPath, PathFollowed};
-use crate::volumetric::{Mover, Remembered, import, memory_pointer};
+use crate::volumetric::{Mover, Remembered};
 use crate::{Failure, Machine};
 use machine::records::Store;
 
@@ -240,136 +237,168 @@ fn write_corrected(path: &CorrectedPath, value: &mut Value) {
     value["periods_limited"] = json!(path.limited);
 }
 
-pub(crate) fn memory_record(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    or_by_its_service(recorded_here(&args.machine, which, output), |service| {
-        let kind = match which {
-            MemoryName::First => "first_memory",
-            MemoryName::Second => "second_memory",
-        };
-        service.remember(kind, &args.machine, output)
-    })
-}
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
 
-fn recorded_here(args: &MachineArgs, which: MemoryName, output: Output) -> Ended {
-    let ready =
-        |machine: &mut Machine, store: &Store| machine.volumetric()?.check_memory(store, which);
-    let record = |machine: &mut Machine, store: &Store, ()| {
-        machine.volumetric()?.record_memory(store, which)
-    };
-    let (kept, counters) = with_zeroed_volume(args, "memory", Use::Motion, output, ready, record)?;
-    output.told(remembered(&kept), counters)
-}
+    use drivers::transport::{SendError, Transport};
+    use units::Time;
+    use wire::{Arrival, Payload, Port};
 
-/// A state that was kept.
-pub(super) fn remembered(kept: &Remembered) -> Told {
-    Told {
-        text: format!(
-            "{} keeps the present state: all parts from now on are made with it\n{}",
-            short(&kept.id),
-            kept_text(kept)
-        ),
-        value: kept_value(kept),
+    use super::*;
+
+    /// Nobody is there, and nobody is asked.
+    struct Nobody;
+
+    impl Transport for Nobody {
+        fn now(&self) -> Time {
+            Time::ZERO
+        }
+
+        fn send(&mut self, _: Port, _: &Payload) -> Result<(), SendError> {
+            panic!("nothing is sent before a path is judged")
+        }
+
+        fn receive(&mut self, _: Time) -> Option<Arrival> {
+            None
+        }
+
+        fn sleep_until(&mut self, _: Time) {}
+
+        fn set_sync(&mut self, _: Port, _: Option<Duration>) -> Result<(), SendError> {
+            Ok(())
+        }
     }
-}
 
-fn kept_text(kept: &Remembered) -> String {
-    let axes = Axis::ALL.into_iter().zip(kept.covers);
-    let axes = axes.filter_map(|(axis, covers)| {
-        let (from, to) = covers?;
-        Some(format!("{axis} {:.3} to {:.3} mm", from.mm(), to.mm()))
-    });
-    let axes: Vec<String> = axes.collect();
-    let rolls = rolls_of(kept);
-    let rolls = match rolls.is_empty() {
-        true => String::new(),
-        false => format!(", with the roll of {}", rolls.join(", ")),
-    };
-    format!(
-        "recorded along {}{rolls}; beyond that, the values at the ends hold{}",
-        axes.join(", "),
-        foreign_text(kept.foreign.as_deref())
-    )
-}
+    fn machine() -> (Machine, Store) {
+        let toml = include_str!("../../../../configs/machines/volumetric.toml");
+        let loaded = config::parse(toml, "volumetric.toml").unwrap();
+        let store = loaded.config.machine.store();
+        (Machine::new(&loaded, Box::new(Nobody)), store)
+    }
 
-/// The axes whose rolls are kept.
-fn rolls_of(kept: &Remembered) -> Vec<String> {
-    let rolls = Axis::ALL.into_iter().zip(&kept.map.roll);
-    let rolls = rolls.filter(|(_, roll)| roll.is_some());
-    rolls.map(|(axis, _)| axis.to_string()).collect()
-}
+    fn judge(text: &str, is_corrected: bool) -> Result<CsvPath, Failure> {
+        judge_joined(text, None, is_corrected)
+    }
 
-/// A second memory that no longer fits the first.
-fn foreign_text(foreign: Option<&str>) -> String {
-    let foreign = foreign.map(short);
-    foreign.map_or_else(String::new, |it| {
-        format!(
-            "\nthe second memory {it} counts from another first memory: before the next part, \
-             record it again (`truestage memory record`) or clear it (`truestage memory clear`)"
-        )
-    })
-}
+    fn judge_joined(
+        text: &str,
+        join: Option<Join>,
+        is_corrected: bool,
+    ) -> Result<CsvPath, Failure> {
+        let mut machine = machine().0;
+        let judge = machine.volumetric().unwrap().path_judge().unwrap();
+        judge.judge((Path::new("path.csv"), text), join, is_corrected)
+    }
 
-fn kept_value(kept: &Remembered) -> Value {
-    let axes = Axis::ALL.into_iter().zip(kept.covers);
-    let axes = axes.filter_map(|(axis, covers)| {
-        let (from, to) = covers?;
-        Some(json!({"axis": axis.to_string(), "from_mm": from.mm(), "to_mm": to.mm()}))
-    });
-    json!({"memory": kept.id, "axes": axes.collect::<Vec<_>>(), "rolls": rolls_of(kept),
-           "foreign_second": kept.foreign})
-}
+    /// As a service judges what it is asked.
+    fn judge_there(asked: &Value) -> Failure {
+        let (mut machine, store) = machine();
+        let group = crate::groups(machine.config()).swap_remove(0);
+        let judge = group.path_judge(&mut machine).unwrap().unwrap();
+        let rows = asked["path"].as_str().unwrap();
+        let join = asked["join"].as_str();
+        let join = join.map(|it| Join::of_text(it).unwrap());
+        judge.judge(&store, (rows, join), false).unwrap_err()
+    }
 
-pub(crate) fn memory_import(args: &ImportArgs, output: Output) -> Ended {
-    if MemoryName::from(args.memory) == MemoryName::Second {
-        return Err(Failure::Usage {
-            what: "a second memory is the state that a first part was made in".into(),
-            help: "record it with `truestage run --first-part` or `truestage memory record`".into(),
+    /// Steps of 5 mm a second along x that suddenly end at `end_mm`; no row is beyond it.
+    fn sudden_end(end_mm: f64) -> String {
+        let rows = (0..=8).map(|row: u32| {
+            let left = 5.0 * f64::from(4_u32.saturating_sub(row));
+            format!("{row},{},100,100\n", end_mm - left)
         });
+        "time_s,x_mm,y_mm,z_mm\n".to_owned() + &rows.collect::<String>()
     }
-    let loaded = config::load(&args.config)?;
-    let text = read(&args.file)?;
-    let head = volume_head_of(&loaded, memory_pointer(MemoryName::First), &args.file)?;
-    let store = loaded.config.machine.store();
-    let file = name_of(&args.file);
-    let kept = import(&loaded.config, &store, head, (&text, &file))?;
-    let text = format!(
-        "{} keeps the designed shape: all parts from now on are made with it\n{}",
-        short(&kept.id),
-        kept_text(&kept)
-    );
-    output.result(&text, &kept_value(&kept))
-}
 
-pub(crate) fn memory_clear(args: &MemoryArgs, output: Output) -> Ended {
-    let which = MemoryName::from(args.memory);
-    or_by_its_service(cleared_here(&args.machine, which, output), |service| {
-        // What counted from it goes out of use with it.
-        cleared(
-            service.clear(memory_pointer(which))?.as_deref(),
-            None,
-            output,
-        )
-    })
-}
+    #[track_caller]
+    fn check_refused(text: &str, is_corrected: bool, why: &str) {
+        let refused = judge(text, is_corrected).unwrap_err();
+        assert_eq!(refused.exit_code(), 3, "{refused}");
+        let said = refused.to_string();
+        for part in ["path.csv", why, "nothing was moved"] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
 
-fn cleared_here(args: &MachineArgs, which: MemoryName, output: Output) -> Ended {
-    let mut session = Session::open(args, "memory", Use::Motion, output)?;
-    let (before, foreign) = session
-        .machine
-        .volumetric()?
-        .clear_memory(&session.store, which)?;
-    cleared(before.as_deref(), foreign.as_deref(), output)
-}
+    #[test]
+    fn a_path_is_judged_as_its_spline_runs_between_the_rows() {
+        // x may go to 503 mm, and is calibrated to 500 mm and 0.25 mm beyond.
+        check_refused(&sudden_end(502.9), false, "axis x: ");
+        check_refused(&sudden_end(499.9), true, "outside the calibrated");
+        judge(&sudden_end(499.0), true).unwrap();
+        judge(&sudden_end(502.0), false).unwrap();
+    }
 
-fn cleared(before: Option<&str>, foreign: Option<&str>, output: Output) -> Ended {
-    let text = match before {
-        Some(id) => format!("{} is no longer in use", short(id)),
-        None => "no memory was in use".into(),
-    };
-    let text = text + &foreign_text(foreign);
-    output.result(
-        &text,
-        &json!({"cleared": before, "foreign_second": foreign}),
-    )
+    #[test]
+    fn a_file_that_is_no_path_is_a_matter_of_usage() {
+        let refused = judge("time_s,x_mm\n", false).unwrap_err();
+        assert_eq!(refused.exit_code(), 2, "{refused}");
+    }
+
+    /// Along x, then along y, at 10 mm/s.
+    fn corner(join: &str) -> String {
+        format!("{join}time_s,x_mm,y_mm,z_mm\n0,100,100,100\n2,120,100,100\n4,120,120,100\n")
+    }
+
+    #[test]
+    fn straight_lines_are_driven_where_the_file_says_so_and_a_tight_corner_says_what_it_needs() {
+        let path = judge(&corner("# join: linear 1mm\n"), true).unwrap();
+        let said = before_it_moves(Path::new("path.csv"), &path);
+        let by = path.departure.size.mm();
+        assert!((0.01..1.0).contains(&by), "{said}");
+        for part in [
+            "straight lines",
+            "(1.000 mm are allowed)",
+            "lines 3 to 5",
+            "longer",
+        ] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+        let tight = corner("# join: linear 1um\n");
+        check_refused(&tight, true, "the corner in line 4 can be passed within 0.");
+        assert_eq!(judge(&corner(""), true).unwrap().join, Join::Spline);
+        let unknown = judge(&corner("# join: circles\n"), true).unwrap_err();
+        assert_eq!(unknown.exit_code(), 2, "{unknown}");
+        assert!(
+            unknown.to_string().contains("line 1: `# join: circles`"),
+            "{unknown}"
+        );
+    }
+
+    #[test]
+    fn a_service_names_the_lines_of_the_file_whatever_joins_its_rows() {
+        let tight = Join::Linear {
+            blend: Metres::from_um(1.0),
+        };
+        let slip = corner("# by hand\n").replace("2,120", "2,12O");
+        for (rows, join, line) in [
+            (&slip, None, "line 4, column x_mm"),
+            (&slip, Some(Join::Spline), "line 4, column x_mm"),
+            (&slip, Some(tight), "line 4, column x_mm"),
+            (&corner(""), Some(tight), "the corner in line 3"),
+            (&corner("# by hand\n"), Some(tight), "the corner in line 4"),
+        ] {
+            let here = judge_joined(rows, join, false).unwrap_err().to_string();
+            assert!(here.contains(line), "{here}");
+            let there = judge_there(&asked_of_service(rows, join, (false, true)));
+            assert_eq!(here.replace("path.csv", "path"), there.to_string());
+        }
+    }
+
+    #[test]
+    fn before_it_moves_it_is_said_how_far_a_corner_is_overshot_and_where() {
+        let path = judge(&sudden_end(400.0), false).unwrap();
+        let said = before_it_moves(Path::new("path.csv"), &path);
+        let by = path.departure.size.mm();
+        assert!((0.3..0.6).contains(&by), "{said}");
+        for part in [
+            "path.csv: 4001 points",
+            "cubic spline",
+            "lines 6 to 7",
+            "x 400.",
+        ] {
+            assert!(said.contains(part), "`{part}` is not in {said}");
+        }
+    }
 }

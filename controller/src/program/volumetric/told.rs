@@ -1,6 +1,6 @@
 //! Runs of three axes in the words of the command line, for whoever keeps a machine.
 
-use crate::program::volumetric::{moved, part, reference, verbs};
+use crate::program::volumetric::{memory, moved, part, reference, verbs};
 use crate::runs::Told;
 use crate::volumetric::VolumetricTeller;
 
@@ -14,7 +14,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         text: verbs::verified_text(verified),
         value: verbs::verified_value(verified),
     },
-    remembered: part::remembered,
+    remembered: memory::remembered,
     moved: moved::moved,
     followed: part::followed,
     referenced: |taken| Told {

@@ -21,12 +21,15 @@ use crate::volumetric::{AXES, BeamConfig};
 /// The standard uncertainty of a straightness by a beam where nobody states any of it: the air along it.
 const BEAM_FLOOR: Metres = Metres(0.1e-6);
 /// By how much of its size such a reading may be wrong, as a standard uncertainty: the width of the spot, which is known
-/// to 1 % either way.
+/// to 1 % either way. It is one error of all readings of a line.
 const BEAM_SCALE: f64 = 0.01 / 1.732;
 /// The standard uncertainty of a roll that the machine's own detectors read, where nobody states it of them.
 const ROLL_FLOOR: Radians = Radians(0.5e-6);
-/// By how much of its size such a reading may be wrong: volts per millimetre.
+/// By how much of its size such a reading may be wrong: volts per millimetre, likewise.
 const ROLL_SCALE: f64 = 0.01;
+/// Who states that nothing is uncertain of references means less than a tenth of a nanometre or nanoradian: what readings have in common
+/// is never all of their uncertainty.
+const LEAST_OWN: f64 = 1e-10;
 /// A stop this close to a node is at it.
 const AT_A_NODE_M: f64 = 1e-6;
 
@@ -85,7 +88,7 @@ impl Session<'_> {
             let u_mean = u_mean.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             let scale = deviation.value() * BEAM_SCALE;
             let (own, of_end) = (u_straightness(config), self.u_of_end(axis, position));
-            let u = combine(&[own.value(), of_end.value(), u_mean, scale]);
+            let u = combine(&[own.value().max(LEAST_OWN), of_end.value(), u_mean, scale]);
             let at = self.on_axis(axis, position);
             // The slide's tilts act on the detector's place on it alone: not on what an offset of
             // the tool is added to.
@@ -121,7 +124,7 @@ impl Session<'_> {
         let u = record.standard_uncertainties_si.as_ref();
         let sense = self.known.chain().sense(axis);
         let first = reference.at(Metres(record.positions_m[0]));
-        let own = self.u_roll(axis).value();
+        let own = self.u_roll(axis).value().max(LEAST_OWN);
         let each = stops.into_iter().map(|(index, position)| {
             let u_mean = u.and_then(|it| it.get(index)).copied().unwrap_or(0.0);
             let scale = (reference.at(position) - first).value() * ROLL_SCALE;

@@ -82,7 +82,8 @@ pub(super) struct ClearRequest {
     axis: String,
 }
 
-/// Uses a state memory of three axes no longer, nor what counts from it. Nothing moves.
+/// Uses a state memory of three axes no longer. What counted from it stays in use, and nothing is corrected until that is
+/// recorded again or cleared, too: `warning` says so. Nothing moves.
 #[utoipa::path(
     post, path = "/calibrations/clear", tag = "calibrations", request_body = ClearRequest, params(Asks),
     responses(
