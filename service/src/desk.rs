@@ -5,6 +5,7 @@ mod calibrations;
 mod journals;
 mod runs;
 
+use core::sync::atomic::Ordering;
 use core::time::Duration;
 use std::fs::File;
 use std::io::Read;
@@ -21,7 +22,7 @@ use truestage::Failure;
 use crate::figures::Figures;
 use crate::keeper::utc_now;
 use crate::ledger::{Asked, Ledger, LedgerError};
-use crate::order::{Answer, Answered, Letter, Order, Reply};
+use crate::order::{Answer, Answered, Letter, Order, Reply, Unanswered};
 use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
@@ -48,8 +49,7 @@ struct Shared {
     page: Option<Page>,
     /// Who judges paths and jobs.
     judges: Judges,
-    /// As many copies as orders are unanswered, and this one.
-    unanswered: Arc<()>,
+    unanswered: Unanswered,
 }
 
 /// Makes a page of a journal.
@@ -107,7 +107,9 @@ impl Desk {
             caller: caller.clone(),
             reply,
         };
-        match self.letters.try_send(letter) {
+        let sent = self.letters.try_send(letter);
+        self.shared.unanswered.fetch_add(1, Ordering::SeqCst);
+        match sent {
             Ok(()) => Ok(Pending(answer)),
             Err(TrySendError::Full(_)) => Err(Problem::new(
                 Code::Busy,
@@ -120,7 +122,8 @@ impl Desk {
 
     /// How many orders were given and have no answer yet.
     pub fn unanswered(&self) -> usize {
-        Arc::strong_count(&self.shared.unanswered) - 1
+        let count = self.shared.unanswered.load(Ordering::SeqCst);
+        usize::try_from(count).unwrap_or(0)
     }
 
     fn done(&self, caller: &Caller, order: Order) -> Result<(), Problem> {

@@ -1,5 +1,6 @@
 //! What goes to the machine's thread, and what comes back.
 
+use core::sync::atomic::{AtomicIsize, Ordering};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -124,24 +125,36 @@ pub(crate) type Answered = Result<Answer, Problem>;
 /// The place for an answer; while it is there, the order counts as unanswered.
 #[derive(Debug)]
 pub(crate) struct Reply {
-    sender: oneshot::Sender<Answered>,
-    _unanswered: Arc<()>,
+    sender: Option<oneshot::Sender<Answered>>,
+    unanswered: Unanswered,
 }
 
+/// How many orders are without an answer. Below zero while one is answered before it was counted.
+pub(crate) type Unanswered = Arc<AtomicIsize>;
+
 impl Reply {
-    /// One of those that share `unanswered`, and where its answer comes.
-    pub(crate) fn new(unanswered: &Arc<()>) -> (Self, oneshot::Receiver<Answered>) {
+    /// One of those that share `unanswered`, and where its answer comes. Whoever gives it away counts it then, and not
+    /// before: whoever sees it counted can rely on it that its order is on its way.
+    pub(crate) fn new(unanswered: &Unanswered) -> (Self, oneshot::Receiver<Answered>) {
         let (sender, answer) = oneshot::channel();
         let reply = Self {
-            sender,
-            _unanswered: Arc::clone(unanswered),
+            sender: Some(sender),
+            unanswered: Arc::clone(unanswered),
         };
         (reply, answer)
     }
 
     /// Whoever asked may have gone: that is no reason to do anything else.
-    pub(crate) fn send(self, answered: Answered) {
-        let _ = self.sender.send(answered);
+    pub(crate) fn send(mut self, answered: Answered) {
+        if let Some(sender) = self.sender.take() {
+            let _ = sender.send(answered);
+        }
+    }
+}
+
+impl Drop for Reply {
+    fn drop(&mut self) {
+        self.unanswered.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
