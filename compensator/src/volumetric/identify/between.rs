@@ -150,8 +150,8 @@ fn of_intervals(by_length: &[ByLength], pooled: &Pooled, extent: Extent) -> Vec<
     let at = |interval: usize, place: usize| {
         let of_length = |(it, weights): (&ByLength, &Vec<f64>)| {
             let square = it.squares[interval][place];
-            let each = pooled.squares.iter().zip(weights.clone());
-            each.map(|(size, weight)| (size * square, weight))
+            let each = pooled.squares.iter().zip(weights);
+            each.map(|(size, weight)| (size * square, *weight))
                 .collect::<Vec<_>>()
         };
         let all = by_length.iter().zip(&pooled.weights);
@@ -165,17 +165,18 @@ fn of_intervals(by_length: &[ByLength], pooled: &Pooled, extent: Extent) -> Vec<
 /// How alike it is in the middles of two intervals.
 fn correlations(by_length: &[ByLength], pooled: &Pooled) -> DMatrix<f64> {
     let size = by_length[0].middles.nrows();
-    let of_length = |sum, (it, weights): (&ByLength, &Vec<f64>)| {
-        let each = pooled.squares.iter().zip(weights);
-        sum + &it.middles * each.map(|(size, weight)| size * weight).sum::<f64>()
-    };
-    let all = by_length.iter().zip(&pooled.weights);
-    let covariance = all.fold(DMatrix::zeros(size, size), of_length);
-    let squares = pooled
-        .weights
-        .iter()
-        .flat_map(|it| it.iter().zip(&pooled.squares));
-    let least = ROUNDING * squares.map(|(weight, size)| weight * size).sum::<f64>();
+    let weights = pooled.weights.iter();
+    let squares: Vec<f64> = weights
+        .map(|weights| {
+            let each = pooled.squares.iter().zip(weights);
+            each.map(|(size, weight)| size * weight).sum()
+        })
+        .collect();
+    let all = by_length.iter().zip(&squares);
+    let covariance = all.fold(DMatrix::zeros(size, size), |sum, (it, square)| {
+        sum + &it.middles * *square
+    });
+    let least = ROUNDING * squares.iter().sum::<f64>();
     let own = covariance.map_diagonal(|it: f64| it.max(least).sqrt());
     DMatrix::from_fn(size, size, |m, n| {
         let alike = covariance[(m, n)] / (own[m] * own[n]);

@@ -127,8 +127,8 @@ fn scaled(observations: &[Observation], run: usize, by: f64) -> Vec<Observation>
     each.collect()
 }
 
-/// What a laser of its own stretches a line by, off by three times what is stated of them. Counted as
-/// independent from reading to reading that looks like readings that are wrong.
+/// What a laser of its own stretches a line by, off by three times what is stated of it. Counted as independent from
+/// reading to reading, that looks like readings that are wrong.
 #[test]
 fn what_the_detector_of_a_line_does_to_all_of_it_blames_no_reading() {
     let mut told = 0;
