@@ -9,10 +9,7 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::Edit;
 
-use crate::programs::{Bench, Process, live_rigs, number, program};
-
-/// Below the machine's folder.
-const SOCKET: &str = "truestage.sock";
+use crate::programs::{Bench, Process, SOCKET, live_rigs, number, program};
 
 pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
     let (status, said) = fetch(folder, request, body);
