@@ -92,6 +92,14 @@ pub(crate) fn this_machine(
     }
 }
 
+/// What no instrument of the machine has measured.
+pub(crate) fn measured_elsewhere() -> InstrumentRecord {
+    InstrumentRecord {
+        name: "measured elsewhere".into(),
+        ..InstrumentRecord::default()
+    }
+}
+
 pub(crate) fn drive_record(machine: &machine::Machine, axis: &str) -> IdentityRecord {
     let identity = machine.devices().identity(axis);
     identity

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio::sync::oneshot;
-use truestage::runs::{Change, Choice, JudgedJob, JudgedPath};
+use truestage::runs::{Change, Choice, DataFile, JudgedJob, JudgedPath};
 
 use crate::problem::Problem;
 use crate::request::{
@@ -104,6 +104,22 @@ pub(crate) enum Judged {
         /// It goes on with this journal.
         resume: Option<PathBuf>,
     },
+    /// What was measured or designed elsewhere.
+    Files {
+        files: Vec<DataFile>,
+        /// It goes on with this journal.
+        resume: Option<PathBuf>,
+    },
+}
+
+impl Judged {
+    /// The journal that it goes on with.
+    pub(crate) fn resume(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Job { resume, .. } | Self::Files { resume, .. } => resume.as_ref(),
+            Self::Path { .. } => None,
+        }
+    }
 }
 
 /// What an order that was carried out comes to.

@@ -9,9 +9,11 @@ use truestage::runs::Group;
 use truestage::volumetric::MemoryName;
 use utoipa::ToSchema;
 
+mod given;
 mod rows;
 mod whole;
 
+pub use given::GivenFile;
 pub use rows::{PathRows, PathTable};
 
 use crate::coordinate::Coordinate;
@@ -295,7 +297,15 @@ pub struct RunRequest {
     /// Job: also to points beyond the calibrated range of its axis.
     #[serde(default)]
     pub beyond: bool,
-    /// Job: goes on with this journal of the same job, at the point after the last one that it went on from.
+    /// Calibrate and verify a table whose plate a person reads: what was read of it elsewhere, the placement that is due
+    /// and the next ones, a file each (CSV, the columns as `truestage check` names them). First memory: a shape that was
+    /// designed, one file. Nothing moves, no axis is switched on, and none has to be zeroed. A calibration that has not
+    /// all placements yet is `done` all the same: it says in `told` what is due, and goes on with `resume`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 64)]
+    pub files: Vec<GivenFile>,
+    /// Job: goes on with this journal of the same job, at the point after the last one that it went on from. With
+    /// `files`: with this journal of a calibration or verification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub resume: Option<String>,
@@ -319,6 +329,7 @@ impl RunRequest {
             join: None,
             job: None,
             beyond: false,
+            files: Vec::new(),
             resume: None,
             start: true,
         }

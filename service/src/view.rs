@@ -403,6 +403,9 @@ pub struct QuestionView {
     pub answers: Vec<String>,
     /// Whether any other line of text answers it, too: what was read.
     pub takes_text: bool,
+    /// Whether hands are in the machine until it is answered: no axis is moved or enabled meanwhile.
+    #[serde(default)]
+    pub by_hand: bool,
     /// What is to be done, for programs.
     #[schema(value_type = Object)]
     pub task: serde_json::Value,

@@ -21,6 +21,7 @@ mod monitor;
 mod network;
 mod platform;
 mod programs;
+mod readings;
 mod rotary;
 mod samples;
 mod schema;

@@ -11,7 +11,7 @@ use crate::programs::{Ended, truestage};
 
 const HEADER: &str = "offset,line,deviation_arcsec\n";
 
-fn folder() -> tempfile::TempDir {
+pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
 }
 
@@ -358,7 +358,7 @@ fn the_rotary_table_shows_its_cycle() {
 }
 
 /// The rotary machine with a plate of 36 lines that a person reads.
-fn sighted_machine(folder: &Path, value: &str) {
+pub(crate) fn sighted_machine(folder: &Path, value: &str) {
     let sighting = format!("[rotary.c.sighting]\nvalue = \"{value}\"\nrange_arcsec = 120.0");
     let text = tests::ROTARY
         .machine
@@ -375,7 +375,7 @@ fn sighted_machine(folder: &Path, value: &str) {
 }
 
 /// The placement at `offset` in a file: each line in three passes, which differ by a little.
-fn placement_file(folder: &Path, offset: usize) -> String {
+pub(crate) fn placement_file(folder: &Path, offset: usize) -> String {
     let mut text = String::from("offset,pass,approach,line,deviation_arcsec\n");
     for (at, pass) in ["1,+", "1,-", "2,+"].iter().enumerate() {
         for (_, line, reading) in readings(&[offset], 0.05) {

@@ -413,6 +413,15 @@ fn verifies(live: &Live) {
 }
 
 fn remembers(live: &Live) {
+    let shape = "axis,along,position_mm,displacement_um\nx,y,0,0\nx,y,30,2.5\nx,y,60,0\n";
+    fs::write(live.folder.path().join("shape.csv"), shape).expect("there is room");
+    let designed = live
+        .run_nowhere(&["memory", "import", "machine.toml", "shape.csv"])
+        .with_code(0);
+    assert_eq!(designed["axes"][0]["to_mm"], 60.0, "{designed}");
+    let first = ["memory", "clear", "machine.toml", "--memory", "first"];
+    let cleared = live.run(&first).with_code(0);
+    assert_eq!(cleared["cleared"], designed["memory"]);
     let kept = live.run(&["memory", "record", "machine.toml"]).with_code(0);
     let axes = kept["axes"].as_array().expect("the axes along which it is");
     assert_eq!(axes.len(), 3, "{kept}");
@@ -422,8 +431,7 @@ fn remembers(live: &Live) {
         live.run(&["memory", "record", "machine.toml", "--memory", which])
             .with_code(0);
     }
-    let words = ["memory", "clear", "machine.toml", "--memory", "first"];
-    let cleared = live.run(&words).with_code(0);
+    let cleared = live.run(&first).with_code(0);
     let foreign = text(&cleared["foreign_second"]).to_owned();
     let cleared = live.run(&["memory", "clear", "machine.toml"]).with_code(0);
     assert_eq!(

@@ -1,7 +1,9 @@
 //! The contract of a motion, line by line, on every interface.
 
 mod aside;
+mod by_hand;
 mod calibrations;
+mod files;
 mod groups;
 mod jobs;
 mod jogs;

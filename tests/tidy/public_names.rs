@@ -11,8 +11,8 @@ const LIBRARY: &str = "controller/src/lib.rs";
 const LIST: &str = "tests/tidy/public_names.txt";
 
 /// How many names somebody else's program may be promised; whoever takes one off the list lowers it. The last was
-/// raised for what whoever keeps a machine writes to choose calibrations and to do jobs (decision 0052).
-const PROMISED_MAX: usize = 90;
+/// raised for the files that whoever keeps a machine gives to a run (decision 0067).
+const PROMISED_MAX: usize = 91;
 
 /// The packages whose modules may be offered under another roof.
 const PACKAGES: &[&str] = &[

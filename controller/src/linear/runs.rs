@@ -23,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse: Task::without_warm_up,
     planned,
     perform,
+    is_driven: |_, _| true,
     load,
     with_companions: |_, chosen| Ok(chosen),
     usable,

@@ -23,6 +23,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse,
     planned,
     perform,
+    is_driven: |_, _| true,
     load,
     with_companions: |_, chosen| Ok(chosen),
     usable,
@@ -44,6 +45,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
             // Each screw has its own model; they go back together.
             pointers: screws,
             journals: WHOLE.to_owned(),
+            files: &[],
             runs: &RUNS,
         }
     });

@@ -5,13 +5,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use drivers::device::Identity;
-use machine::records::{
-    EnvironmentRecord, IdentityRecord, InstrumentRecord, RecordHead, SCHEMA_VERSION,
-};
+use machine::records::{EnvironmentRecord, IdentityRecord, RecordHead, SCHEMA_VERSION};
 
 use crate::made_by::made_by;
 use crate::program::data_text::name_of;
-use crate::run::utc_now;
+use crate::run::{measured_elsewhere, utc_now};
 use crate::volumetric::VolumetricFailure;
 use crate::{Failure, config};
 
@@ -80,10 +78,7 @@ fn head(loaded: &config::Loaded, axis: &str, drive: &Identity, data: &Path) -> R
         created: utc_now(),
         program: made_by(),
         source: name_of(Path::new(data.file_name().unwrap_or_default())),
-        instrument: InstrumentRecord {
-            name: "measured elsewhere".into(),
-            ..Default::default()
-        },
+        instrument: measured_elsewhere(),
         environment: EnvironmentRecord::default(),
     }
 }

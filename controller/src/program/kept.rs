@@ -4,6 +4,7 @@
 //! with the command line itself has been refused by then.
 
 mod calibrated;
+mod files;
 mod heard;
 mod jobs;
 mod memories;
@@ -23,6 +24,7 @@ use crate::program::chosen::{Used, told};
 use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
+use crate::program::rotary::readings::is_turned_by_hand;
 use crate::program::session::stop_on_signals;
 use crate::program::{AskArgs, AxisArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
 use crate::runs::Choice;
@@ -81,7 +83,16 @@ impl Service {
         asked: Vec<&'static Asked>,
         output: Output,
     ) -> Ended {
-        refuse(!args.readings.is_empty(), "--readings")?;
+        if !args.readings.is_empty() {
+            let request = json!({"uncompensated": args.uncompensated});
+            let resume = args.resume.as_ref();
+            return self.by_readings(
+                (Stage::Verify, request),
+                &args.axis,
+                (&args.readings, resume),
+                output,
+            );
+        }
         let stop = self.prepare(&args.axis, output)?;
         let request = json!({"axis": args.axis.axis, "uncompensated": args.uncompensated});
         let resume = args.resume.as_deref();
@@ -119,7 +130,10 @@ impl Service {
     fn prepare(&self, args: &AxisArgs, output: Output) -> Result<StopRequest, Failure> {
         refuse(args.machine.record.is_some(), "--record")?;
         let stop = stop_request()?;
-        self.zero_first(args.axis.as_deref(), &stop, output)?;
+        // Nobody who turns a table by hand expects it to turn by itself.
+        if !is_turned_by_hand(args)? {
+            self.zero_first(args.axis.as_deref(), &stop, output)?;
+        }
         Ok(stop)
     }
 

@@ -419,6 +419,7 @@ mod tests {
             asked: Asked::Close,
             text: "close?".into(),
             turns,
+            by_hand: false,
         };
         terminal.question(&question(false)).unwrap();
         assert_eq!(terminal.answer().unwrap(), None);

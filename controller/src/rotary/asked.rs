@@ -70,6 +70,7 @@ fn asked(question: &sighted::Question) -> Question {
         text: question.text.clone(),
         answers,
         takes_text: true,
+        by_hand: question.by_hand,
         task,
     }
 }

@@ -201,7 +201,6 @@ impl<'a> Calibration<'a> {
     }
 
     /// The placements that were read.
-    #[cfg(feature = "program")]
     pub(crate) fn placed(&self) -> &[Placed] {
         &self.placed
     }

@@ -224,6 +224,13 @@ pub struct SightingConfig {
     pub range_arcsec: f64,
 }
 
+impl SightingConfig {
+    /// Whether the table is driven to each line; a person turns it by hand otherwise.
+    pub(crate) const fn is_driven(&self) -> bool {
+        matches!(self.value, SightedName::ToLine)
+    }
+}
+
 /// What planned offsets keep small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

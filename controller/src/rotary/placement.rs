@@ -36,6 +36,17 @@ impl RotaryTable<'_> {
         operator: &mut dyn Operator,
     ) -> Result<(), Failure> {
         self.rest()?;
+        self.hand_over(run, due, operator)?;
+        Ok(self.core.enable(self.axis)?)
+    }
+
+    /// The same of a table that whoever brings the plate about turns, too: the axis stays off.
+    pub(super) fn hand_over(
+        &mut self,
+        run: &PlateRun,
+        due: &DuePlacement,
+        operator: &mut dyn Operator,
+    ) -> Result<(), Failure> {
         self.core.disable(self.axis)?;
         let lies_at = self.memory.plate_at.take();
         operator.ask(&run.task(self.axis, due, lies_at))?;
@@ -43,7 +54,7 @@ impl RotaryTable<'_> {
             let look = self.core.now() + LOOK_EVERY;
             self.core.tick(look)?;
         }
-        Ok(self.core.enable(self.axis)?)
+        Ok(())
     }
 
     /// Reads the plate as it lies, `done` passes of `total` being read already. `phase` is that of

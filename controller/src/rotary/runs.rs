@@ -3,7 +3,6 @@
 use core::f64::consts::TAU;
 use core::time::Duration;
 
-use compensator::rotary::Sighted;
 use machine::Stage;
 use machine::records::Store;
 use serde_json::json;
@@ -12,12 +11,15 @@ use units::Radians;
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
-use crate::rotary::RotaryTeller;
 use crate::rotary::asked::Asking;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
+use crate::rotary::sighted::alone::Progress;
 use crate::rotary::table::RotaryTable;
+use crate::rotary::{RotaryCalibrated, RotaryTeller, SightingConfig};
 use crate::run::missing;
-use crate::runs::{Change, Found, Group, GroupRuns, Planned, Task, Travel, Work, each_usable};
+use crate::runs::{
+    Change, Found, Group, GroupRuns, Planned, Task, Told, Travel, Work, each_usable,
+};
 
 pub(crate) static RUNS: GroupRuns = GroupRuns {
     groups,
@@ -27,6 +29,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse: Task::without_warm_up,
     planned,
     perform,
+    is_driven,
     load,
     with_companions: |_, chosen| Ok(chosen),
     usable,
@@ -37,8 +40,20 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
 };
 
 fn groups(config: &MachineConfig) -> Vec<Group> {
-    let axes = config.rotary.keys();
-    axes.map(|it| Group::of_one(it, &RUNS)).collect()
+    let groups = config.rotary.iter().map(|(axis, own)| Group {
+        files: match own.sighting {
+            Some(_) => &[Stage::Calibrate, Stage::Verify],
+            None => &[],
+        },
+        ..Group::of_one(axis, &RUNS)
+    });
+    groups.collect()
+}
+
+/// Whether the machine turns the table while its plate is read.
+fn is_driven(config: &MachineConfig, axis: &str) -> bool {
+    let sighting = config.rotary[axis].sighting.as_ref();
+    sighting.is_none_or(SightingConfig::is_driven)
 }
 
 /// A verification by a detector is one placement: it is read again.
@@ -66,7 +81,6 @@ fn planned(machine: &mut Machine, axis: &str, task: &Task) -> Result<Planned, Fa
 
 impl RotaryTable<'_> {
     fn planned_calibration(&self) -> Result<Planned, Failure> {
-        self.require_driven()?;
         let (run, config) = self.subject().plate_run()?;
         let design = config.design()?;
         let offsets: Vec<f64> = design.offsets().iter().map(|it| *it as f64).collect();
@@ -81,7 +95,6 @@ impl RotaryTable<'_> {
     }
 
     fn planned_verification(&self) -> Result<Planned, Failure> {
-        self.require_driven()?;
         let own = self.config.verify.as_ref();
         let own = own.ok_or_else(|| missing(self.axis, "verify"))?;
         let (run, _) = self.subject().plate_run()?;
@@ -96,7 +109,8 @@ impl RotaryTable<'_> {
         Ok(self.planned_run(&run, vec![task.text()]))
     }
 
-    /// What placements that are brought about by `asks` come to: each pass is a turn at least.
+    /// What placements that are brought about by `asks` come to: each pass is a turn at least, of whoever turns the
+    /// table.
     fn planned_run(&self, run: &PlateRun, mut asks: Vec<String>) -> Planned {
         let turns = u64::from(run.sweeps()) * asks.len() as u64;
         let travel = TAU * turns as f64;
@@ -104,27 +118,18 @@ impl RotaryTable<'_> {
             let each = u64::from(run.sweeps()) * u64::from(run.lines);
             asks.push(format!("{each} lines are read in each placement"));
         }
-        Planned {
+        let by_hand = Planned {
             points: turns * u64::from(run.lines),
+            asks,
+            ..Planned::default()
+        };
+        if !self.is_driven() {
+            return by_hand;
+        }
+        Planned {
             travel: Some(Travel::Angle(Radians(travel))),
             at_least: Duration::try_from_secs_f64(travel / run.speed.value()).unwrap_or_default(),
-            asks,
-        }
-    }
-
-    /// # Errors
-    /// When a person turns the table by hand to read its plate, without the machine.
-    fn require_driven(&self) -> Result<(), Failure> {
-        let sighting = self.config.sighting.as_ref();
-        match sighting.map(|it| Sighted::from(it.value)) {
-            None | Some(Sighted::ToLine) => Ok(()),
-            Some(Sighted::Angle | Sighted::Deviation) => Err(Failure::Usage {
-                what: format!(
-                    "axis {}: its plate is read by a person who turns the table without its machine",
-                    self.axis
-                ),
-                help: "end the service, and use the verb of the command line".into(),
-            }),
+            ..by_hand
         }
     }
 }
@@ -161,39 +166,62 @@ fn calibrate(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> 
     let options = task.calibrate_options();
     let words = work.words::<RotaryTeller>();
     let mut table = work.machine.rotary(axis)?;
-    table.require_driven()?;
     let (store, mut person) = (work.store, Asking(work.person));
-    let made = match table.config.sighting {
-        None => table.calibrate(store, &options, &mut person),
-        Some(_) => table.calibrate_sighted(store, &options, &mut person),
-    }?;
-    Ok(Found {
+    let progress = match table.config.sighting {
+        None => {
+            let made = table.calibrate(store, &options, &mut person)?;
+            let told = words.map(|it| (it.calibrated)(axis, &made));
+            return Ok(found(axis, &made, told));
+        }
+        Some(_) if !task.files.is_empty() => table.calibrate_from(store, &options, &task.files)?,
+        Some(_) => {
+            let made = table.calibrate_sighted(store, &options, &mut person)?;
+            Progress::Done(Box::new(made))
+        }
+    };
+    let told = words.map(|it| (it.progress)(axis, &progress));
+    Ok(match &progress {
+        Progress::Done(made) => found(axis, made, told),
+        Progress::Due(next) => Found {
+            figures: json!({
+                "placements_read": next.read.len(),
+                "placements": next.task.step.1,
+                "due_offset": next.task.offset,
+                "columns": next.columns,
+                "journal": next.journal,
+            }),
+            told,
+            ..Found::default()
+        },
+    })
+}
+
+fn found(axis: &str, made: &RotaryCalibrated, told: Option<Told>) -> Found {
+    Found {
         figures: json!({
             "calibration": made.id,
             "largest_deviation_arcsec": made.content.largest_error().arcsec(),
             "closure_arcsec": made.closure.arcsec(),
             "journal": made.journal,
         }),
-        told: words.map(|it| (it.calibrated)(axis, &made)),
+        told,
         stored: vec![(axis.to_owned(), made.id.clone())],
         ..Found::default()
-    })
+    }
 }
 
 fn verify(work: Work<'_>, axis: &str, task: &Task) -> Result<Found, Failure> {
     let compensated = !task.uncompensated;
     let words = work.words::<RotaryTeller>();
     let mut table = work.machine.rotary(axis)?;
-    table.require_driven()?;
     let (store, mut person) = (work.store, Asking(work.person));
     // Uncompensated, too: it knows the plate's errors.
     table.load_active(store)?;
+    let how = (compensated, task.resume.as_ref());
     let verified = match table.config.sighting {
         None => table.verify(store, compensated, &mut person),
-        Some(_) => {
-            let how = (compensated, task.resume.as_ref());
-            table.verify_sighted(store, how, &mut person)
-        }
+        Some(_) if !task.files.is_empty() => table.verify_from(store, how, &task.files),
+        Some(_) => table.verify_sighted(store, how, &mut person),
     }?;
     let judged = verified.left.as_ref();
     Ok(Found {

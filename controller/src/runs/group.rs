@@ -44,6 +44,8 @@ pub struct Group {
     pub pointers: Vec<String>,
     /// What its journals are called.
     pub(crate) journals: String,
+    /// Which of its runs take files of what was measured or designed elsewhere.
+    pub(crate) files: &'static [Stage],
     /// What its kind does for it.
     pub(crate) runs: &'static GroupRuns,
 }
@@ -65,6 +67,8 @@ pub(crate) struct GroupRuns {
     pub(crate) planned: fn(&mut Machine, &str, &Task) -> Result<Planned, Failure>,
     /// Does it.
     pub(crate) perform: fn(Work<'_>, &str, &Task) -> Result<Found, Failure>,
+    /// Whether its drives are on meanwhile; a person who turns a table by hand has them off.
+    pub(crate) is_driven: fn(&MachineConfig, &str) -> bool,
     /// Uses the active calibration of each of its axes: the axis, and its calibration.
     pub(crate) load: fn(&mut Machine, &Store, &str) -> Result<InUse, Failure>,
     /// What else is used otherwise when these are: what counts from them.
@@ -100,6 +104,7 @@ impl Group {
             parts: Vec::new(),
             pointers: vec![axis.to_owned()],
             journals: axis.to_owned(),
+            files: &[],
             runs,
         }
     }
@@ -130,7 +135,21 @@ impl Group {
     /// When `task` has one.
     pub fn refuse(&self, task: &Task) -> Result<(), Failure> {
         task.refuse_of_calibrations()?;
+        self.refuse_files(task)?;
         (self.runs.refuse)(task)
+    }
+
+    fn refuse_files(&self, task: &Task) -> Result<(), Failure> {
+        if task.is_driven() || self.files.contains(&task.stage) {
+            return Ok(());
+        }
+        Err(Failure::Usage {
+            what: format!(
+                "`files`, and {} measures itself for a run of this kind",
+                self.name
+            ),
+            help: "leave them out".into(),
+        })
     }
 
     /// What a run of it will do.
@@ -153,7 +172,7 @@ impl Group {
         person: &mut dyn Person,
         teller: Option<&Teller>,
     ) -> Result<Found, Failure> {
-        if task.stage != Stage::Zero {
+        if self.needs_power(machine, task) {
             self.axes.iter().try_for_each(|it| machine.enable(it))?;
         }
         let work = Work {
@@ -176,10 +195,17 @@ impl Group {
                 Err(failure) => found.bad = Some(failure),
             }
         }
-        if let (Some(told), Some(teller)) = (&mut found.told, teller) {
+        // Of files no device has counted anything.
+        if let (Some(told), Some(teller), true) = (&mut found.told, teller, task.is_driven()) {
             told.value["counters"] = (teller.counters)(machine);
         }
         Ok(found)
+    }
+
+    /// A zero switches on what it needs itself.
+    fn needs_power(&self, machine: &Machine, task: &Task) -> bool {
+        let is_zero = task.stage == Stage::Zero;
+        !is_zero && task.is_driven() && (self.runs.is_driven)(&machine.config, &self.name)
     }
 
     /// Uses the active calibration of each of its axes from now on, and says which that is.

@@ -5,6 +5,7 @@
 //! command line: `runs.rs` in its folder. [`groups`](crate::groups) lists what a machine has.
 
 mod choice;
+mod data_file;
 mod group;
 mod job;
 mod path;
@@ -15,6 +16,7 @@ mod teller;
 mod together;
 
 pub use choice::{Change, Choice};
+pub use data_file::DataFile;
 pub use group::{Group, Moved};
 pub use job::{AskedJob, JobJudge, JudgedJob};
 pub use path::{JudgedPath, PathJudge};

@@ -16,6 +16,8 @@ pub struct Question {
     pub answers: &'static [&'static str],
     /// Whether any other line of text answers it, too: something that was read.
     pub takes_text: bool,
+    /// Whether hands are in the machine until it is answered: nothing else moves then.
+    pub by_hand: bool,
     /// What is to be done, for programs.
     pub task: Value,
 }
@@ -28,6 +30,7 @@ impl Question {
             text,
             answers: &["done"],
             takes_text: false,
+            by_hand: true,
             task,
         }
     }

@@ -7,6 +7,7 @@ use machine::Stage;
 use machine::records::Store;
 use serde_json::Value;
 
+use super::data_file::DataFile;
 use super::job::JudgedJob;
 use super::path::JudgedPath;
 use super::person::Person;
@@ -41,6 +42,9 @@ pub struct Task {
     pub memory: Option<MemoryName>,
     /// The job that is done, where it is one.
     pub job: Option<JudgedJob>,
+    /// What was measured or designed elsewhere, in place of what the machine would measure: then nothing moves, and
+    /// nothing is switched on.
+    pub files: Vec<DataFile>,
 }
 
 impl Task {
@@ -58,7 +62,13 @@ impl Task {
             first_part: false,
             memory: None,
             job: None,
+            files: Vec::new(),
         }
+    }
+
+    /// Whether the machine does it itself, with its drives.
+    pub(crate) const fn is_driven(&self) -> bool {
+        self.files.is_empty()
     }
 
     /// # Errors
@@ -94,6 +104,10 @@ impl Task {
             (false, true) if !is_calibration => {
                 refused("`verify` is for calibrations", "leave it out")
             }
+            (false, true) if !self.is_driven() => refused(
+                "`verify` together with `files`: a verification has files of its own",
+                "leave it out, and verify afterwards",
+            ),
             _ => Ok(()),
         }
     }

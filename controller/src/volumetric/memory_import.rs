@@ -8,7 +8,10 @@ use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
+use crate::run::{measured_elsewhere, utc_now};
+use crate::runs::DataFile;
 use crate::store::{CalibrationRecord, RecordHead, Store};
+use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::memory::foreign_second;
 use crate::volumetric::reference::measured_geometry;
 use crate::volumetric::{
@@ -43,6 +46,34 @@ pub fn import(
         covers,
         foreign: foreign_second(store)?,
     })
+}
+
+impl WorkVolume<'_> {
+    /// The same for whoever keeps the machine: its drives were asked who they are.
+    ///
+    /// # Errors
+    /// Those of [`import`].
+    pub(crate) fn import_memory(
+        &self,
+        store: &Store,
+        file: &DataFile,
+    ) -> Result<Remembered, Failure> {
+        let head = RecordHead {
+            created: utc_now(),
+            source: file.name.clone(),
+            instrument: measured_elsewhere(),
+            ..self.this_volume(memory_pointer(MemoryName::First))?
+        };
+        import(self.core.config, store, head, (&file.text, &file.name))
+    }
+}
+
+/// A second memory is the state that a first part was made in: nobody designs it.
+pub(crate) fn no_designed_second() -> Failure {
+    Failure::Usage {
+        what: "a second memory is the state that a first part was made in".into(),
+        help: "record it with `truestage run --first-part` or `truestage memory record`".into(),
+    }
 }
 
 /// The name of the references in use, which watch every axis of the shape.

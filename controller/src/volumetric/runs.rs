@@ -10,13 +10,14 @@ use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::runs::{
-    Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
+    DataFile, Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
 };
 use crate::volumetric::asked::Asking;
 use crate::volumetric::calibrate::minutes_of;
 use crate::volumetric::calibrate::plan::{set_up_task, volume_plan};
 use crate::volumetric::chosen;
 use crate::volumetric::handle::WorkVolume;
+use crate::volumetric::memory_import::no_designed_second;
 use crate::volumetric::motion::{MOVES, require_measured};
 use crate::volumetric::{GEOMETRY, MemoryName, VerifyBy, VolumetricTeller, WarmUp, memory_pointer};
 
@@ -37,6 +38,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse,
     planned,
     perform,
+    is_driven: |_, _| true,
     load,
     with_companions: chosen::with_companions,
     usable: chosen::usable,
@@ -58,6 +60,7 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
         parts: volume.axes.iter().map(|it| Part::of_length(it)).collect(),
         pointers: chosen::pointers(),
         journals: GEOMETRY.to_owned(),
+        files: &[Stage::Reference],
         runs: &RUNS,
     });
     group.collect()
@@ -75,6 +78,9 @@ fn warm_up_of(task: &Task) -> Result<WarmUp, Failure> {
 }
 
 fn refuse(task: &Task) -> Result<(), Failure> {
+    if !task.files.is_empty() {
+        require_shape(task.memory, &task.files)?;
+    }
     match task.stage {
         Stage::Calibrate => drop(warm_up_of(task)?),
         Stage::Zero | Stage::Verify | Stage::Reference | Stage::Job => task.without_warm_up()?,
@@ -141,7 +147,10 @@ fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {
         Stage::Verify => verify(work, task),
         Stage::Reference => match task.memory {
             None => reference(work),
-            Some(memory) => remember(work, memory),
+            Some(memory) => match task.files.as_slice() {
+                [] => remember(work, memory),
+                files => import(work, memory, files),
+            },
         },
     }
 }
@@ -253,6 +262,35 @@ fn reference(work: Work<'_>) -> Result<Found, Failure> {
     Ok(Found {
         figures: json!({"references": taken.id, "geometry": taken.references.content.geometry}),
         told: words.map(|it| (it.referenced)(&taken)),
+        ..Found::default()
+    })
+}
+
+/// The file of a designed shape: a first memory is one of one file.
+fn require_shape(memory: Option<MemoryName>, files: &[DataFile]) -> Result<&DataFile, Failure> {
+    match (memory, files) {
+        (Some(MemoryName::First), [file]) => Ok(file),
+        (Some(MemoryName::First), _) => Err(Failure::Usage {
+            what: format!("{} files, and a designed shape is one", files.len()),
+            help: "give that one".into(),
+        }),
+        (Some(MemoryName::Second), _) => Err(no_designed_second()),
+        (None, _) => Err(Failure::Usage {
+            what: "`files`, and references are what the machine's detectors see".into(),
+            help: "leave them out".into(),
+        }),
+    }
+}
+
+/// Keeps a designed shape as the state in which all later parts are made; nothing moves.
+fn import(work: Work<'_>, memory: MemoryName, files: &[DataFile]) -> Result<Found, Failure> {
+    let words = work.words::<VolumetricTeller>();
+    let file = require_shape(Some(memory), files)?;
+    let volume = work.machine.volumetric()?;
+    let kept = volume.import_memory(work.store, file)?;
+    Ok(Found {
+        figures: json!({"memory": kept.id, "foreign_second": kept.foreign}),
+        told: words.map(|it| (it.designed)(&kept)),
         ..Found::default()
     })
 }

@@ -22,6 +22,8 @@ pub struct VolumetricTeller {
     pub referenced: fn(referenced: &VolumetricReferenced) -> Told,
     /// A state that is kept.
     pub remembered: fn(kept: &Remembered) -> Told,
+    /// A designed shape that is kept.
+    pub designed: fn(kept: &Remembered) -> Told,
     /// A corrected move that was made.
     pub moved: fn(moved: &VolumetricMoved) -> Told,
     /// A path that was followed, what joined its rows, and what later parts are made with when it was the first.

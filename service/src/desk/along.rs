@@ -10,7 +10,7 @@ use truestage::runs::{AskedJob, JobJudge, PathJudge};
 use super::Desk;
 use crate::order::Judged;
 use crate::problem::{Code, Problem};
-use crate::request::{PathRows, RunKind, RunRequest};
+use crate::request::{GivenFile, PathRows, RunKind, RunRequest};
 
 /// Who judges paths and jobs.
 #[derive(Debug, Default)]
@@ -36,6 +36,7 @@ impl Desk {
         match request.kind {
             RunKind::Path | RunKind::FirstPart => self.judge_path(request).map(Some),
             RunKind::Job => self.judge_job(request).map(Some),
+            _ if !request.files.is_empty() => self.judge_files(request).map(Some),
             RunKind::Zero
             | RunKind::Calibrate
             | RunKind::Verify
@@ -43,6 +44,16 @@ impl Desk {
             | RunKind::FirstMemory
             | RunKind::SecondMemory => Ok(None),
         }
+    }
+
+    /// What stands in them is judged by whoever takes them.
+    fn judge_files(&self, request: &RunRequest) -> Result<Judged, Problem> {
+        let files = request.files.iter().map(GivenFile::checked);
+        let resume = request.resume.as_deref().map(|it| self.journal_path(it));
+        Ok(Judged::Files {
+            files: files.collect::<Result<_, _>>()?,
+            resume: resume.transpose()?,
+        })
     }
 
     fn judge_path(&self, request: &RunRequest) -> Result<Judged, Problem> {
@@ -112,12 +123,18 @@ impl Desk {
 fn refuse_what_is_of_others(request: &RunRequest) -> Result<(), Problem> {
     let is_path = matches!(request.kind, RunKind::Path | RunKind::FirstPart);
     let is_job = request.kind == RunKind::Job;
+    let goes_on = is_job || !request.files.is_empty();
     let given = [
         ("path", "path", request.path.is_some() && !is_path),
         ("join", "path", request.join.is_some() && !is_path),
         ("job", "job", request.job.is_some() && !is_job),
         ("beyond", "job", request.beyond && !is_job),
-        ("resume", "job", request.resume.is_some() && !is_job),
+        (
+            "files",
+            "calibrate",
+            !request.files.is_empty() && (is_path || is_job),
+        ),
+        ("resume", "job", request.resume.is_some() && !goes_on),
     ];
     let Some((option, kind, _)) = given.into_iter().find(|it| it.2) else {
         return Ok(());

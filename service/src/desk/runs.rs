@@ -29,12 +29,13 @@ impl Desk {
             // It says itself which one does it.
             Some(Judged::Job { job, .. }) => Some(job.axis.clone()),
             Some(Judged::Path { group, .. }) => Some(group.clone()),
-            None => request.axis.clone(),
+            Some(Judged::Files { .. }) | None => request.axis.clone(),
         };
         let request = RunRequest {
             axis,
             path: None,
             job: None,
+            files: Vec::new(),
             ..request.clone()
         };
         Order::Plan {

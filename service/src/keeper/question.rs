@@ -93,7 +93,7 @@ impl Keeper {
     /// What was asked since the last tick becomes part of the run. What is to be done by hand is asked when everything
     /// else stands and is switched off, too.
     pub(super) fn take_question(&mut self, machine: &mut Machine) -> Result<(), machine::Failure> {
-        let Some(by_hand) = self.talk.borrow().asked.as_ref().map(|it| !it.takes_text) else {
+        let Some(by_hand) = self.talk.borrow().asked.as_ref().map(|it| it.by_hand) else {
             return Ok(());
         };
         if !by_hand || self.clear_for_hands(machine)? {
@@ -110,12 +110,15 @@ impl Keeper {
             return;
         };
         run.asked += 1;
+        // What is read by hand is asked line by line: hands are there in between, too.
+        run.has_hands = question.by_hand && question.takes_text;
         let question = QuestionView {
             number: run.asked,
             what: question.what.to_owned(),
             text: question.text,
             answers: question.answers.iter().map(|it| (*it).to_owned()).collect(),
             takes_text: question.takes_text,
+            by_hand: question.by_hand,
             task: question.task,
         };
         let (id, data) = (run.view.id.clone(), json!(question));
@@ -145,14 +148,15 @@ impl Keeper {
     /// Refuses what moves an axis, or switches one on, while a run has asked for something that is done by hand.
     pub(super) fn require_no_hands(&self) -> Result<(), Problem> {
         let talk = self.talk.borrow();
-        let is_next = talk.asked.as_ref().is_some_and(|it| !it.takes_text);
+        let is_next = talk.asked.as_ref().is_some_and(|it| it.by_hand);
         drop(talk);
         let Some(run) = self.runs.running() else {
             return Ok(());
         };
         let number = match &run.view.question {
-            Some(question) if !question.takes_text => question.number,
+            Some(question) if question.by_hand => question.number,
             _ if is_next => run.asked + 1,
+            None if run.has_hands => run.asked,
             _ => return Ok(()),
         };
         let what = format!(

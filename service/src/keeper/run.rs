@@ -10,7 +10,7 @@ use std::sync::Arc;
 use machine::{Machine, Stage};
 use serde_json::json;
 use truestage::Failure;
-use truestage::runs::Found;
+use truestage::runs::{Found, Planned};
 
 use super::mechanics::Mechanics;
 use super::seat::Task as SeatTask;
@@ -43,6 +43,8 @@ fn plan_along(judged: &Judged) -> RunPlanView {
     match judged {
         Judged::Path { path, .. } => RunPlanView::of_path(path),
         Judged::Job { job, .. } => shown(job.planned.clone()),
+        // Nothing moves, and nobody is asked.
+        Judged::Files { .. } => shown(Planned::default()),
     }
 }
 
@@ -70,10 +72,7 @@ impl Keeper {
             request: request.clone(),
             is_resumed: grouped.is_resumed(request.kind),
             group,
-            resume: match &judged {
-                Some(Judged::Job { resume, .. }) => resume.clone(),
-                Some(Judged::Path { .. }) | None => None,
-            },
+            resume: judged.as_ref().and_then(Judged::resume).cloned(),
             judged,
         };
         task.group.refuse(&task.of_procedure())?;
@@ -114,10 +113,11 @@ impl Keeper {
         self.require_running()?;
         let run = self.runs.find(id)?;
         let (axes, kind) = (run.axes.clone(), run.view.kind);
+        let needs_zero = kind != RunKind::Zero && !run.task.has_files();
         self.require_no_run()?;
         for at in &axes {
             self.require_free(*at)?;
-            if kind != RunKind::Zero {
+            if needs_zero {
                 let zeroed = machine.require_zeroed(&self.seats[*at].name);
                 zeroed.map_err(truestage::Failure::from)?;
             }

@@ -45,7 +45,7 @@ impl<'b> Hand<'b> {
     }
 
     /// Does what is asked, and says so.
-    fn does(&mut self, id: &str, question: &QuestionView) {
+    pub(super) fn does(&mut self, id: &str, question: &QuestionView) {
         let offset = question.task["offset"].as_f64().expect("an offset");
         let lines = offset - self.lies_at;
         self.lies_at = offset;
@@ -368,7 +368,14 @@ fn the_axis_stays_supervised_while_somebody_is_asked() {
 
 /// A plate of few lines on a table that these can see, which a person reads.
 pub(crate) fn stage_with_a_reader(rig: Rig, folder: &std::path::Path) -> Stage {
-    let emulated = with_few_lines(ROTARY.emulated).edit("lines = 72", "lines = 24");
+    stage_read_by("to_line", rig, folder)
+}
+
+/// The same, of which he reads that.
+pub(super) fn stage_read_by(value: &str, rig: Rig, folder: &std::path::Path) -> Stage {
+    let emulated = with_few_lines(ROTARY.emulated)
+        .edit("lines = 72", "lines = 24")
+        .edit("    { order = 18, amplitude_arcsec = 0.3 },\n", "");
     let shipped = Shipped {
         emulated: Box::leak(emulated.into_boxed_str()),
         ..ROTARY
@@ -376,8 +383,8 @@ pub(crate) fn stage_with_a_reader(rig: Rig, folder: &std::path::Path) -> Stage {
     Stage::new(rig, (shipped, SEED), folder, |text| {
         let detector =
             "[rotary.c.line_detector]       # at the drive's touch probe 1\nedge = \"positive\"";
-        let sighting = "[rotary.c.sighting]\nvalue = \"to_line\"\nrange_arcsec = 200.0";
-        text.edit(detector, sighting)
+        let sighting = format!("[rotary.c.sighting]\nvalue = {value:?}\nrange_arcsec = 200.0");
+        text.edit(detector, &sighting)
             .edit("lines = 360", "lines = 24")
             .edit("offset_lines = 200.5", "offset_lines = 12.5")
             .edit("closure_limit_arcsec = 0.1 ", "closure_limit_arcsec = 5.0 ")

@@ -8,6 +8,7 @@ use crate::program::CalibrateArgs;
 use crate::program::answering::Asked;
 use crate::program::exchange::plain;
 use crate::program::output::{Ended, Output};
+use crate::program::rotary::readings::only_for_driven;
 use crate::program::tried::{Cut, Made};
 use crate::runs::Told;
 use crate::{Failure, config};
@@ -19,7 +20,17 @@ impl Service {
         asked: Vec<&'static Asked>,
         output: Output,
     ) -> Ended {
-        refuse(!args.readings.is_empty(), "--readings")?;
+        if !args.readings.is_empty() {
+            only_for_driven(args.verify)?;
+            let request = json!({"accept_drift": args.accept_drift, "aside": args.no_activate});
+            let resume = args.resume.as_ref();
+            return self.by_readings(
+                (Stage::Calibrate, request),
+                &args.axis,
+                (&args.readings, resume),
+                output,
+            );
+        }
         if args.resume.is_some() {
             // The run goes on as it was asked for.
             refuse(args.no_activate, "--no-activate with --resume")?;

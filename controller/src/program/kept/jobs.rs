@@ -46,7 +46,7 @@ impl Service {
     }
 
     /// What is gone on with anew is not gone on with twice.
-    fn give_up_paused(&self, request: &Value) -> Result<(), Failure> {
+    pub(super) fn give_up_paused(&self, request: &Value) -> Result<(), Failure> {
         let Some(journal) = request["resume"].as_str() else {
             return Ok(());
         };

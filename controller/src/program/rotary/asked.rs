@@ -42,16 +42,21 @@ pub(crate) const ASKED: &[Asked] = &[
 fn read_line(terminal: &mut Terminal, text: &str, task: &Value) -> Result<(), Failure> {
     let line = task["line"].as_u64().and_then(|it| u32::try_from(it).ok());
     let nominal = task["nominal_deg"].as_f64().map(Radians::from_degrees);
-    let (Some(line), Some(nominal), Some("to_line")) = (line, nominal, task["value"].as_str())
-    else {
+    let value = match task["value"].as_str() {
+        Some("to_line") => Some(Sighted::ToLine),
+        Some("angle") => Some(Sighted::Angle),
+        Some("deviation") => Some(Sighted::Deviation),
+        _ => None,
+    };
+    let (Some(line), Some(nominal), Some(value)) = (line, nominal, value) else {
         return Err(not_understood(sighted::READ_LINE));
     };
     let asked = sighted::Asked::Line {
         line,
-        value: Sighted::ToLine,
+        value,
         nominal,
     };
-    put(terminal, asked, text, true)
+    put(terminal, asked, text, value == Sighted::ToLine)
 }
 
 fn put(
@@ -64,5 +69,6 @@ fn put(
         asked,
         text: plain(text),
         turns,
+        by_hand: !turns,
     })
 }

@@ -4,9 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use compensator::rotary::Sighted;
 use machine::records::{Lease, Store};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::Failure;
 use crate::config::{self, Loaded};
@@ -15,12 +14,12 @@ use crate::program::data_text::{name_of, read};
 use crate::program::operator::Terminal;
 use crate::program::output::{Ended, Output};
 use crate::program::resume::{journal_to_resume, resumable};
-use crate::program::rotary::json::arcsec;
-use crate::program::rotary::told::{calibrated_text, calibrated_value, verified};
+use crate::program::rotary::told::{self, verified};
 use crate::program::session::choose_axis;
 use crate::program::{AxisArgs, CalibrateArgs, VerifyArgs, only_for};
-use crate::rotary::sighted::alone::{self, NextPlacement, Progress, ReadingsFile, Source};
+use crate::rotary::sighted::alone::{self, Source};
 use crate::rotary::subject::Subject;
+use crate::runs::DataFile;
 
 /// Readings that were made elsewhere.
 #[derive(Clone, Debug, Args)]
@@ -49,9 +48,9 @@ impl ReadingsArgs {
         }
     }
 
-    fn files(&self) -> Result<Vec<ReadingsFile>, Failure> {
+    pub(crate) fn files(&self) -> Result<Vec<DataFile>, Failure> {
         let file = |path: &PathBuf| {
-            Ok(ReadingsFile {
+            Ok(DataFile {
                 name: name_of(path),
                 text: read(path)?,
             })
@@ -91,9 +90,7 @@ impl ReadBy {
                      --readings out"
                 ),
             }),
-            Some(it) if readings.is_empty() && Sighted::from(it.value) == Sighted::ToLine => {
-                Ok(Self::Driven)
-            }
+            Some(it) if readings.is_empty() && it.is_driven() => Ok(Self::Driven),
             Some(_) => Ok(Self::Alone),
         }
     }
@@ -156,11 +153,7 @@ impl Desk {
 }
 
 pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
-    only_for(
-        "--verify",
-        "tables that the machine turns; verify this one afterwards",
-        args.verify,
-    )?;
+    only_for_driven(args.verify)?;
     let files = args.readings.files()?;
     let mut person = reader(&files, args.ask.yes, &args.axis, output)?;
     let desk = Desk::open(&args.axis, "calibrate")?;
@@ -176,13 +169,8 @@ pub(crate) fn calibrate(args: &CalibrateArgs, output: Output) -> Ended {
         let source = source(&files, &mut person);
         alone::calibrate(desk.subject()?, store, &options, source)
     })?;
-    let (text, mut value) = match &progress {
-        Progress::Done(it) => (calibrated_text(it), calibrated_value(it)),
-        Progress::Due(it) => (next_text(it, &desk), next_value(it)),
-    };
-    value["axis"] = json!(axis);
-    value["complete"] = json!(matches!(progress, Progress::Done(_)));
-    output.result(&text, &value)
+    let told = told::progress(axis, &progress);
+    output.result(&told.text, &told.value)
 }
 
 pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
@@ -198,9 +186,38 @@ pub(crate) fn verify(args: &VerifyArgs, output: Output) -> Ended {
     verified(axis, &it, Value::Null, output)
 }
 
+/// # Errors
+/// When it is to be verified at once: what is read of it then is another file.
+pub(crate) fn only_for_driven(verify: bool) -> Result<(), Failure> {
+    only_for(
+        "--verify",
+        "tables that the machine turns; verify this one afterwards",
+        verify,
+    )
+}
+
+/// Whether the plate is read by a person who turns the table himself.
+pub(crate) fn is_turned_by_hand(args: &AxisArgs) -> Result<bool, Failure> {
+    let loaded = config::load(&args.machine.config)?;
+    let meant = |it: &&String| args.axis.as_ref().is_none_or(|axis| axis == *it);
+    let mut meant = loaded.config.rotary.iter().filter(|(axis, _)| meant(axis));
+    Ok(meant.any(|(_, it)| it.sighting.as_ref().is_some_and(|it| !it.is_driven())))
+}
+
+/// The journal of `verb` that `resume` names, or the newest that was left.
+pub(crate) fn newest_of(
+    verb: &str,
+    args: &AxisArgs,
+    resume: Option<&PathBuf>,
+) -> Result<Option<PathBuf>, Failure> {
+    let loaded = config::load(&args.machine.config)?;
+    let axis = axis_of(&loaded, args)?;
+    journal_to_resume(resume, &loaded.config.machine.store(), verb, &axis)
+}
+
 /// Who reads where there are no files.
 fn reader(
-    files: &[ReadingsFile],
+    files: &[DataFile],
     yes: bool,
     args: &AxisArgs,
     output: Output,
@@ -211,55 +228,9 @@ fn reader(
         .transpose()
 }
 
-fn source<'a>(files: &'a [ReadingsFile], person: &'a mut Option<Terminal>) -> Source<'a> {
+fn source<'a>(files: &'a [DataFile], person: &'a mut Option<Terminal>) -> Source<'a> {
     match person {
         Some(person) => Source::Person(person),
         None => Source::Files(files),
     }
-}
-
-/// What was imported, and what is to be done next.
-fn next_text(next: &NextPlacement, desk: &Desk) -> String {
-    let (_, of) = next.task.step;
-    let mut text = format!(
-        "axis {}: {} of {of} placements are read",
-        desk.axis,
-        next.read.len()
-    );
-    for (offset, closure, scatter) in &next.read {
-        let scatter = scatter.map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
-        text += &format!(
-            "\n  at offset {offset} the plate moved by {:+.3}″ while it was read; one line in one pass \
-             scatters by {scatter}",
-            closure.arcsec()
-        );
-    }
-    let sighting = desk.loaded.config.rotary[&desk.axis].sighting.as_ref();
-    let header = sighting.map_or("", |it| Sighted::from(it.value).header());
-    text + &format!(
-        "\n  next: {}\n  then continue with --resume --readings FILE (columns {header})\n  readings in {}",
-        next.task.text(),
-        next.journal.display()
-    )
-}
-
-fn next_value(next: &NextPlacement) -> Value {
-    let read = next.read.iter().map(|(offset, closure, scatter)| {
-        json!({
-            "offset": offset,
-            "closure_arcsec": arcsec(*closure),
-            "pass_scatter_arcsec": scatter.map(arcsec),
-        })
-    });
-    let (number, of) = next.task.step;
-    json!({
-        "placements_read": read.collect::<Vec<_>>(),
-        "due": {
-            "placement": number,
-            "of": of,
-            "offset": next.task.offset,
-            "task": next.task.text(),
-        },
-        "journal": next.journal,
-    })
 }

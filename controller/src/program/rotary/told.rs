@@ -8,6 +8,7 @@ use crate::program::rotary::json::{arcsec, bidirectional, harmonics, solution};
 use crate::program::rotary::uncertainty;
 use crate::program::text::verdict;
 use crate::program::tried::used;
+use crate::rotary::sighted::alone::{NextPlacement, Progress};
 use crate::rotary::verify::RotaryFigures;
 use crate::rotary::{RotaryCalibrated, RotaryMoved, RotaryTeller, RotaryVerified};
 use crate::runs::Told;
@@ -16,6 +17,7 @@ use crate::runs::Told;
 pub(crate) static TELLER: RotaryTeller = RotaryTeller {
     zeroed,
     calibrated,
+    progress,
     verified: told_verified,
     moved,
 };
@@ -41,6 +43,64 @@ pub(crate) fn calibrated(axis: &str, calibrated: &RotaryCalibrated) -> Told {
         text: calibrated_text(calibrated),
         value,
     }
+}
+
+/// How far a calibration of a plate that a person reads has come.
+pub(crate) fn progress(axis: &str, progress: &Progress) -> Told {
+    let mut told = match progress {
+        Progress::Done(it) => calibrated(axis, it),
+        Progress::Due(it) => Told {
+            text: next_text(axis, it),
+            value: next_value(it),
+        },
+    };
+    told.value["axis"] = json!(axis);
+    told.value["complete"] = json!(matches!(progress, Progress::Done(_)));
+    told
+}
+
+/// What was read, and what is to be done next.
+fn next_text(axis: &str, next: &NextPlacement) -> String {
+    let (_, of) = next.task.step;
+    let mut text = format!(
+        "axis {axis}: {} of {of} placements are read",
+        next.read.len()
+    );
+    for (offset, closure, scatter) in &next.read {
+        let scatter = scatter.map_or("unknown".to_owned(), |it| format!("{:.4}″", it.arcsec()));
+        text += &format!(
+            "\n  at offset {offset} the plate moved by {:+.3}″ while it was read; one line in one pass \
+             scatters by {scatter}",
+            closure.arcsec()
+        );
+    }
+    text + &format!(
+        "\n  next: {}\n  then continue with --resume --readings FILE (columns {})\n  readings in {}",
+        next.task.text(),
+        next.columns,
+        next.journal.display()
+    )
+}
+
+fn next_value(next: &NextPlacement) -> Value {
+    let read = next.read.iter().map(|(offset, closure, scatter)| {
+        json!({
+            "offset": offset,
+            "closure_arcsec": arcsec(*closure),
+            "pass_scatter_arcsec": scatter.map(arcsec),
+        })
+    });
+    let (number, of) = next.task.step;
+    json!({
+        "placements_read": read.collect::<Vec<_>>(),
+        "due": {
+            "placement": number,
+            "of": of,
+            "offset": next.task.offset,
+            "task": next.task.text(),
+        },
+        "journal": next.journal,
+    })
 }
 
 pub(crate) fn told_verified(axis: &str, verified: &RotaryVerified) -> Told {

@@ -1,9 +1,10 @@
 //! States of three axes that are kept on purpose, so that all parts are alike: recorded, designed, forgotten.
 
 use compensator::volumetric::Axis;
-use machine::records::{Store, short};
+use machine::records::{Lease, Store, short};
 use serde_json::{Value, json};
 
+use crate::Machine;
 use crate::config;
 use crate::ports::Use;
 use crate::program::MachineArgs;
@@ -14,9 +15,9 @@ use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::volumetric::memory_args::{ImportArgs, MemoryArgs};
 use crate::program::volumetric::verbs::with_zeroed_volume;
-use crate::runs::Told;
+use crate::runs::{DataFile, Told};
+use crate::volumetric::memory_import::no_designed_second;
 use crate::volumetric::{self, MemoryName, Remembered, memory_pointer};
-use crate::{Failure, Machine};
 
 pub(crate) fn record(args: &MemoryArgs, output: Output) -> Ended {
     let which = MemoryName::from(args.memory);
@@ -100,23 +101,37 @@ pub(super) fn kept_value(kept: &Remembered) -> Value {
 
 pub(crate) fn import(args: &ImportArgs, output: Output) -> Ended {
     if MemoryName::from(args.memory) == MemoryName::Second {
-        return Err(Failure::Usage {
-            what: "a second memory is the state that a first part was made in".into(),
-            help: "record it with `truestage run --first-part` or `truestage memory record`".into(),
-        });
+        return Err(no_designed_second());
     }
+    let file = DataFile {
+        name: name_of(&args.file),
+        text: read(&args.file)?,
+    };
+    or_by_its_service(imported_here(args, &file, output), |service| {
+        service.design(&file, output)
+    })
+}
+
+fn imported_here(args: &ImportArgs, file: &DataFile, output: Output) -> Ended {
     let loaded = config::load(&args.config)?;
-    let text = read(&args.file)?;
     let head = volume_head_of(&loaded, memory_pointer(MemoryName::First), &args.file)?;
     let store = loaded.config.machine.store();
-    let file = name_of(&args.file);
-    let kept = volumetric::import(&loaded.config, &store, head, (&text, &file))?;
-    let text = format!(
-        "{} keeps the designed shape: all parts from now on are made with it\n{}",
-        short(&kept.id),
-        kept_text(&kept)
-    );
-    output.result(&text, &kept_value(&kept))
+    let _lease = Lease::take(&store, "memory")?;
+    let kept = volumetric::import(&loaded.config, &store, head, (&file.text, &file.name))?;
+    let told = designed(&kept);
+    output.result(&told.text, &told.value)
+}
+
+/// A designed shape that is kept.
+pub(super) fn designed(kept: &Remembered) -> Told {
+    Told {
+        text: format!(
+            "{} keeps the designed shape: all parts from now on are made with it\n{}",
+            short(&kept.id),
+            kept_text(kept)
+        ),
+        value: kept_value(kept),
+    }
 }
 
 pub(crate) fn clear(args: &MemoryArgs, output: Output) -> Ended {

@@ -15,6 +15,7 @@ pub(crate) static TELLER: VolumetricTeller = VolumetricTeller {
         value: verbs::verified_value(verified),
     },
     remembered: memory::remembered,
+    designed: memory::designed,
     moved: moved::moved,
     followed: part::followed,
     referenced: |taken| Told {

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+#[cfg(feature = "program")]
 use super::dialog::Dialog;
-pub(crate) use super::import::ReadingsFile;
-use super::import::import;
+use super::import::{import, readings};
+#[cfg(feature = "program")]
 use super::person::Person;
-use super::stand::Alone;
+#[cfg(feature = "program")]
+use super::stand::{Alone, IDLE};
 use crate::failure::Failure;
 use crate::rotary::calibrate::{Calibration, RotaryCalibrated};
 use crate::rotary::operator::PlateTask;
@@ -16,14 +18,16 @@ use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::subject::Subject;
 use crate::rotary::verify::{RotaryVerified, Verification};
 use crate::run::CalibrateOptions;
+use crate::runs::DataFile;
 use crate::store::Store;
 use units::Radians;
 
 /// Where the readings of placements come from.
 pub(crate) enum Source<'a> {
     /// One placement a file.
-    Files(&'a [ReadingsFile]),
+    Files(&'a [DataFile]),
     /// Somebody types them.
+    #[cfg(feature = "program")]
     Person(&'a mut dyn Person),
 }
 
@@ -41,6 +45,8 @@ pub(crate) struct NextPlacement {
     pub(crate) journal: PathBuf,
     /// What a person has to do for it.
     pub(crate) task: PlateTask,
+    /// The columns of its file.
+    pub(crate) columns: &'static str,
     /// The placements that were read: offset, how far the plate moved meanwhile, and the scatter of one
     /// line in one pass.
     pub(crate) read: Vec<(f64, Radians, Option<Radians>)>,
@@ -60,6 +66,7 @@ pub(crate) fn calibrate(
         return Ok(Progress::Due(Box::new(NextPlacement {
             journal: it.journal.path().to_owned(),
             task: it.run.task(it.subject.axis, &due, due.known),
+            columns: it.run.sighting(it.subject.axis)?.value.header(),
             read: it
                 .placed()
                 .iter()
@@ -83,7 +90,7 @@ fn before_anything_is_written(
     if let (Source::Files([first, ..]), None) = (source, &options.resume)
         && let Some(offset) = config.design()?.offsets().first()
     {
-        first.readings(&run, sighting, *offset as f64)?;
+        readings(first, (&run, sighting), *offset as f64)?;
     }
     Ok(())
 }
@@ -95,6 +102,7 @@ fn read_placements(
 ) -> Result<Option<DuePlacement>, Failure> {
     let axis = it.subject.axis;
     match source {
+        #[cfg(feature = "program")]
         Source::Person(person) => {
             while let Some(due) = it.due()? {
                 let placed = typed(axis, &it.run, &due, &mut **person, &mut it.journal)?;
@@ -137,6 +145,7 @@ pub(crate) fn verify(
             what: "no file of readings".into(),
             help: "give one with --readings".into(),
         }),
+        #[cfg(feature = "program")]
         Source::Person(person) => typed(axis, &it.run, &due, person, &mut it.journal),
     };
     let placed = placed.inspect_err(|failure| it.journal.note(failure))?;
@@ -147,13 +156,14 @@ fn imported(
     axis: &str,
     run: &PlateRun,
     due: &DuePlacement,
-    file: &ReadingsFile,
+    file: &DataFile,
     journal: &mut PlateJournal,
 ) -> Result<Placed, Failure> {
     let sighting = run.sighting(axis)?;
     import(axis, (run, sighting), due.offset, file, journal)
 }
 
+#[cfg(feature = "program")]
 fn typed(
     axis: &str,
     run: &PlateRun,
@@ -171,7 +181,7 @@ fn typed(
     } else {
         person.ask(&run.task(axis, due, due.known))?;
         while !person.is_done()? {
-            person.wait(super::stand::IDLE);
+            person.wait(IDLE);
         }
     }
     let dialog = Dialog::new(axis, run, sighting, due.offset);

@@ -144,7 +144,7 @@ impl<'a> Dialog<'a> {
     ) -> Result<Next, Failure> {
         let nominal = self.plan.nominal(place.line as usize);
         stand.go_to(nominal, place.approach, self.plan.spacing())?;
-        let question = self.question(place, nominal, journal, stand.turns());
+        let question = self.question(place, nominal, journal, stand);
         loop {
             let answer = match parse(&answered(&question, stand, person)?) {
                 Ok(answer) => answer,
@@ -197,7 +197,7 @@ impl<'a> Dialog<'a> {
         place: Place,
         nominal: Radians,
         journal: &PlateJournal,
-        turns: bool,
+        stand: &dyn Stand,
     ) -> Question {
         let read: usize = journal
             .so_far()
@@ -217,7 +217,8 @@ impl<'a> Dialog<'a> {
                 place.line,
                 self.plan.lines * self.plan.passes().count(),
             ),
-            turns,
+            turns: stand.turns(),
+            by_hand: !stand.turns(),
         }
     }
 
@@ -331,6 +332,7 @@ impl<'a> Dialog<'a> {
             asked: Asked::Close,
             text: self.summary(&judged),
             turns: false,
+            by_hand: !stand.turns(),
         };
         loop {
             let refused = match parse(&answered(&question, stand, person)?) {

@@ -1,10 +1,13 @@
-//! A plate read by a person on a table that the machine drives to each line.
+//! A plate read by a person on a table of a machine: it drives it to each line, or lets him turn it by hand.
 
 use std::path::PathBuf;
 
+use super::alone::{self, Progress, Source};
 use super::dialog::Dialog;
 use super::person::Person;
+use super::stand::ByHand;
 use crate::failure::Failure;
+use crate::rotary::SightingConfig;
 use crate::rotary::calibrate::RotaryCalibrated;
 use crate::rotary::placed::Placed;
 use crate::rotary::plate_journal::PlateJournal;
@@ -12,6 +15,7 @@ use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::verify::RotaryVerified;
 use crate::run::CalibrateOptions;
+use crate::runs::DataFile;
 use crate::store::Store;
 
 impl RotaryTable<'_> {
@@ -47,6 +51,47 @@ impl RotaryTable<'_> {
         )
     }
 
+    /// As [`RotaryTable::calibrate`], by what was read of the plate elsewhere: nothing moves.
+    ///
+    /// # Errors
+    /// The first thing in `files` that is not as it should be, with file, line and column.
+    pub(crate) fn calibrate_from(
+        &mut self,
+        store: &Store,
+        options: &CalibrateOptions,
+        files: &[DataFile],
+    ) -> Result<Progress, Failure> {
+        let source = Source::Files(files);
+        let progress = alone::calibrate(self.subject(), store, options, source)?;
+        self.load_active(store)?;
+        Ok(progress)
+    }
+
+    /// As [`RotaryTable::verify`], by what was read of the plate elsewhere: nothing moves.
+    ///
+    /// # Errors
+    /// The first thing in `files` that is not as it should be, with file, line and column; where a calibration makes
+    /// the table worse it is no longer used.
+    pub(crate) fn verify_from(
+        &mut self,
+        store: &Store,
+        how: (bool, Option<&PathBuf>),
+        files: &[DataFile],
+    ) -> Result<RotaryVerified, Failure> {
+        let verified = alone::verify(self.subject(), store, how, Source::Files(files));
+        if verified.is_err() {
+            self.forget_calibration();
+            self.load_active(store)?;
+        }
+        verified
+    }
+
+    /// Whether the machine turns the table; a person does otherwise, while its drive is off.
+    pub(crate) fn is_driven(&self) -> bool {
+        let sighting = self.config.sighting.as_ref();
+        sighting.is_none_or(SightingConfig::is_driven)
+    }
+
     fn read_by(
         &mut self,
         run: &PlateRun,
@@ -61,9 +106,14 @@ impl RotaryTable<'_> {
             due.known = Some(due.offset);
             self.memory.plate_at = Some(due.offset);
         }
-        self.place_plate(run, &due, person)?;
         let dialog = Dialog::new(self.axis, run, sighting, due.offset);
-        let placed = dialog.read(self, person, journal)?;
+        let placed = if self.is_driven() {
+            self.place_plate(run, &due, person)?;
+            dialog.read(self, person, journal)
+        } else {
+            self.hand_over(run, &due, person)?;
+            dialog.read(&mut ByHand(self), person, journal)
+        }?;
         self.memory.plate_at = Some(due.offset);
         Ok(placed)
     }

@@ -10,29 +10,20 @@ use crate::rotary::plate_run::PlateRun;
 use crate::rotary::sighting::Sighting;
 use crate::rotary::{PlateEntry, SightedEntry};
 use crate::run::utc_now;
+use crate::runs::DataFile;
 use crate::store::Log;
 
-/// A file of readings: what it is called, and what stands in it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct ReadingsFile {
-    pub(crate) name: String,
-    pub(crate) text: String,
-}
-
-impl ReadingsFile {
-    /// The readings of the placement at `offset`.
-    ///
-    /// # Errors
-    /// The first thing that is not as it should be, with file, line and column.
-    pub(super) fn readings(
-        &self,
-        run: &PlateRun,
-        sighting: Sighting,
-        offset: f64,
-    ) -> Result<Vec<SightedReading>, Failure> {
-        let plan = sighting.plan(offset, run.lines, run.passes);
-        Ok(plan.from_csv(&self.text, &self.name, sighting.value)?)
-    }
+/// The readings of the placement at `offset` in `file`.
+///
+/// # Errors
+/// The first thing that is not as it should be, with file, line and column.
+pub(super) fn readings(
+    file: &DataFile,
+    (run, sighting): (&PlateRun, Sighting),
+    offset: f64,
+) -> Result<Vec<SightedReading>, Failure> {
+    let plan = sighting.plan(offset, run.lines, run.passes);
+    Ok(plan.from_csv(&file.text, &file.name, sighting.value)?)
 }
 
 /// Writes the placement at `offset` into the journal, once all of it was judged.
@@ -40,10 +31,10 @@ pub(super) fn import(
     axis: &str,
     (run, sighting): (&PlateRun, Sighting),
     offset: f64,
-    file: &ReadingsFile,
+    file: &DataFile,
     journal: &mut PlateJournal,
 ) -> Result<Placed, Failure> {
-    let readings = file.readings(run, sighting, offset)?;
+    let readings = readings(file, (run, sighting), offset)?;
     let plan = sighting.plan(offset, run.lines, run.passes);
     let beside = offset.fract() * plan.spacing().value();
     let at = utc_now();

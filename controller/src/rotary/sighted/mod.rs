@@ -5,12 +5,10 @@
 //! stands in the journal as soon as it was typed, and may be typed again until its placement is closed.
 //! Where nothing is driven the machine is not needed: neither its buses nor power.
 
-#[cfg(feature = "program")]
 pub(crate) mod alone;
 mod answer;
 mod dialog;
 mod driven;
-#[cfg(feature = "program")]
 mod import;
 mod person;
 mod stand;

@@ -33,6 +33,8 @@ pub struct Question {
     pub text: String,
     /// Whether an answer makes the table turn.
     pub turns: bool,
+    /// Whether his hands turn it: nothing else may move until he is no longer asked.
+    pub by_hand: bool,
 }
 
 /// Who turns the plate and reads its lines. Whoever asks lives on meanwhile: he asks once, and then

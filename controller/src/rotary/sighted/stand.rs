@@ -63,6 +63,31 @@ impl Stand for Alone {
     }
 }
 
+/// A table that a person turns by hand: its drive is off, and what is typed says where it is. Its machine lives on.
+pub(super) struct ByHand<'s, 't>(pub(super) &'s mut RotaryTable<'t>);
+
+impl Stand for ByHand<'_, '_> {
+    fn turns(&self) -> bool {
+        false
+    }
+
+    fn go_to(&mut self, _: Radians, _: Approach, _: Radians) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn beyond(&self, _: Radians) -> Result<Radians, Failure> {
+        Ok(Radians::ZERO)
+    }
+
+    fn live(&mut self) -> Result<Duration, Failure> {
+        self.0.live()
+    }
+
+    fn now_s(&self) -> f64 {
+        self.0.now_s()
+    }
+}
+
 impl Stand for RotaryTable<'_> {
     fn turns(&self) -> bool {
         true

@@ -5,7 +5,7 @@ use compensator::rotary::{Sighted, SightedPlan};
 use machine::records::ReadJournal;
 use units::Radians;
 
-use super::alone::{NextPlacement, Progress, ReadingsFile, Source, calibrate, verify};
+use super::alone::{NextPlacement, Progress, Source, calibrate, verify};
 use super::{Asked, Person, Question};
 use crate::Edit;
 use crate::config::{self, Loaded};
@@ -15,6 +15,7 @@ use crate::rotary::operator::{Operator, PlateMove, PlateTask};
 use crate::rotary::subject::Subject;
 use crate::rotary::{PlateLog, RotaryFailure, SightingConfig};
 use crate::run::CalibrateOptions;
+use crate::runs::DataFile;
 use crate::store::{IdentityRecord, RecordHead, Store, read_journal};
 use crate::stores::store_in;
 
@@ -170,7 +171,7 @@ impl Reader {
     }
 
     /// The file of the placement where the plate lies.
-    fn file(&mut self, plan: &SightedPlan, value: Sighted) -> ReadingsFile {
+    fn file(&mut self, plan: &SightedPlan, value: Sighted) -> DataFile {
         let mut text = format!("{}\n", value.header());
         for (pass, approach) in plan.passes() {
             for line in 0..LINES {
@@ -180,7 +181,7 @@ impl Reader {
             }
         }
         let name = format!("offset-{}.csv", plan.offset);
-        ReadingsFile { name, text }
+        DataFile { name, text }
     }
 
     fn place(&mut self, offset: f64) {
@@ -264,7 +265,7 @@ fn imported(
     loaded: &Loaded,
     store: &Store,
     resume: Option<&NextPlacement>,
-    files: &[ReadingsFile],
+    files: &[DataFile],
 ) -> Result<Progress, Failure> {
     let options = CalibrateOptions {
         resume: resume.map(|it| it.journal.clone()),
@@ -519,7 +520,7 @@ fn placements_come_file_by_file_each_when_it_is_due_and_bad_ones_change_nothing(
     let mut reader = Reader::new(17);
     reader.place(offsets[0]);
     let first = reader.file(&plan(&loaded, offsets[0]), value);
-    let worse = ReadingsFile {
+    let worse = DataFile {
         text: first.text.edit_first("0,1,+,5,", "0,1,+,5,9"),
         ..first.clone()
     };

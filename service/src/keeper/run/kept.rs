@@ -27,7 +27,7 @@ pub(crate) struct Task {
     pub(crate) is_resumed: bool,
     /// The journal that it goes on with.
     pub(crate) resume: Option<PathBuf>,
-    /// The path that it follows, or the job that it does.
+    /// The path that it follows, the job that it does, or the files that it takes.
     pub(super) judged: Option<Judged>,
 }
 
@@ -46,13 +46,22 @@ impl Task {
             first_part: self.request.kind == RunKind::FirstPart,
             path: match &self.judged {
                 Some(Judged::Path { path, .. }) => Some(path.clone()),
-                Some(Judged::Job { .. }) | None => None,
+                _ => None,
             },
             job: match &self.judged {
                 Some(Judged::Job { job, .. }) => Some(job.clone()),
-                Some(Judged::Path { .. }) | None => None,
+                _ => None,
+            },
+            files: match &self.judged {
+                Some(Judged::Files { files, .. }) => files.clone(),
+                _ => Vec::new(),
             },
         }
+    }
+
+    /// Whether it is done by files, without any axis.
+    pub(super) const fn has_files(&self) -> bool {
+        matches!(self.judged, Some(Judged::Files { .. }))
     }
 }
 
@@ -65,6 +74,8 @@ pub(in crate::keeper) struct Run {
     published: Option<Arc<RunView>>,
     /// So many questions were asked.
     pub(in crate::keeper) asked: u32,
+    /// Whether hands stay in the machine after the last one was answered.
+    pub(in crate::keeper) has_hands: bool,
     /// The last that was answered, and how.
     pub(in crate::keeper) answered: Option<(u32, String)>,
     /// Somebody stopped it; it ends so when its procedure has ended and its axes stand.
@@ -83,6 +94,7 @@ impl Run {
             view,
             published: None,
             asked: 0,
+            has_hands: false,
             answered: None,
             stopped: None,
             is_pausing: false,
@@ -142,13 +154,13 @@ impl Runs {
         self.published = None;
     }
 
-    /// Paths are long, and wait in memory until they are followed; so do jobs.
+    /// Paths are long, and wait in memory until they are followed; so do jobs and files.
     pub(super) fn require_room_for(&self, judged: Option<&Judged>) -> Result<(), Problem> {
         let waiting = self.kept.iter().filter(|it| it.task.judged.is_some());
         if judged.is_none() || waiting.count() < PATHS {
             return Ok(());
         }
-        let what = format!("{PATHS} paths and jobs are planned or under way");
+        let what = format!("{PATHS} paths, jobs and files are planned or under way");
         Err(Problem::new(Code::Busy, what, "start them, or abort one"))
     }
 
