@@ -2,19 +2,16 @@
 
 use core::time::Duration;
 
-use service::{AxisState, Code, RunKind, RunRequest, RunState};
+use service::{AxisState, Code, RunState};
 
-use super::questions::{Hand, stage_read_by};
+use super::questions::{Hand, as_found, stage_read_by};
 use super::{anna, each};
 
 #[test]
 fn hands_that_turn_the_table_have_it_switched_off_from_the_first_question_to_the_end() {
     let new = |rig, folder: &std::path::Path| stage_read_by("angle", rig, folder);
     each(new, |bed| {
-        let verify = RunRequest {
-            uncompensated: true,
-            ..RunRequest::of(RunKind::Verify, None)
-        };
+        let verify = as_found();
         // Angles count from the zero.
         let early = bed.client.plan(&anna(), &verify).unwrap_err();
         assert_eq!(early.code, Code::NotZeroed, "{early}");

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use service::{AxisState, Code, GivenFile, RunKind, RunRequest, RunState, RunView};
-use tests::VOLUMETRIC;
-use tests::volume::{Volume, good, quick};
 
+use super::memories::with_references;
 use super::questions::{few_placements, stage_read_by};
 use super::{Bed, SEED, anna, each, each_here};
 use crate::client::PATIENCE;
@@ -135,18 +134,9 @@ fn a_table_that_a_detector_reads_takes_no_files() {
     });
 }
 
-/// Errors are known and the detectors' references taken: a shape counts from them.
 #[test]
 fn a_designed_shape_is_kept_as_the_first_memory_and_no_other_run_of_three_axes_takes_files() {
-    let mut before = Volume::zeroed(SEED, quick, |text| text);
-    let store = before.bench.store.clone();
-    before.know_errors();
-    good(before.work().reference(&store));
-    let new = |rig, folder: &Path| {
-        before.bequeath(&folder.join("volumetric"));
-        Stage::new(rig, (VOLUMETRIC, SEED), folder, quick)
-    };
-    each_here(new, |bed: &Bed<'_>| {
+    with_references(|bed: &Bed<'_>| {
         let shape = |last: &str| GivenFile {
             name: "shape.csv".into(),
             text: format!(

@@ -35,9 +35,8 @@ impl Bed<'_> {
     }
 }
 
-/// Errors are known and the detectors' references taken: what is seen beyond them is kept.
-#[test]
-fn a_state_is_kept_used_and_forgotten_with_what_counts_from_it() {
+/// Errors are known and the detectors' references taken: what is seen or designed beyond them is kept.
+pub(super) fn with_references(body: impl Fn(&Bed<'_>)) {
     let mut before = Volume::zeroed(SEED, quick, |text| text);
     let store = before.bench.store.clone();
     before.know_errors();
@@ -46,14 +45,16 @@ fn a_state_is_kept_used_and_forgotten_with_what_counts_from_it() {
         before.bequeath(&folder.join("volumetric"));
         Stage::new(rig, (VOLUMETRIC, SEED), folder, quick)
     };
-    each_here(
-        new,
-        zeroed(|bed: &Bed<'_>| {
-            are_kept(bed);
-            are_forgotten(bed);
-            are_refused(bed);
-        }),
-    );
+    each_here(new, body);
+}
+
+#[test]
+fn a_state_is_kept_used_and_forgotten_with_what_counts_from_it() {
+    with_references(zeroed(|bed: &Bed<'_>| {
+        are_kept(bed);
+        are_forgotten(bed);
+        are_refused(bed);
+    }));
 }
 
 fn are_kept(bed: &Bed<'_>) {

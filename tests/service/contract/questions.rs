@@ -398,13 +398,18 @@ fn with_a_reader(body: impl Fn(&Bed<'_>)) {
     });
 }
 
+/// A verification of the table without a calibration.
+pub(super) fn as_found() -> RunRequest {
+    RunRequest {
+        uncompensated: true,
+        ..RunRequest::of(RunKind::Verify, None)
+    }
+}
+
 #[test]
 fn what_a_person_reads_of_a_plate_is_answered_line_by_line_and_nothing_else_is_taken() {
     with_a_reader(|bed| {
-        let verify = RunRequest {
-            uncompensated: true,
-            ..RunRequest::of(RunKind::Verify, None)
-        };
+        let verify = as_found();
         let id = bed.client.plan(&anna(), &verify).unwrap();
         let mut hand = Hand::new(bed);
         let mut lines = 0;

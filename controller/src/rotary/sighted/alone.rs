@@ -8,7 +8,7 @@ use super::import::{import, readings};
 #[cfg(feature = "program")]
 use super::person::Person;
 #[cfg(feature = "program")]
-use super::stand::{Alone, IDLE};
+use super::stand::{ByHand, IDLE};
 use crate::failure::Failure;
 use crate::rotary::calibrate::{Calibration, RotaryCalibrated};
 use crate::rotary::operator::PlateTask;
@@ -185,5 +185,5 @@ fn typed(
         }
     }
     let dialog = Dialog::new(axis, run, sighting, due.offset);
-    dialog.read(&mut Alone, person, journal)
+    dialog.read(&mut ByHand(None), person, journal)
 }

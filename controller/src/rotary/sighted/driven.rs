@@ -112,7 +112,7 @@ impl RotaryTable<'_> {
             dialog.read(self, person, journal)
         } else {
             self.hand_over(run, &due, person)?;
-            dialog.read(&mut ByHand(self), person, journal)
+            dialog.read(&mut ByHand(Some(self)), person, journal)
         }?;
         self.memory.plate_at = Some(due.offset);
         Ok(placed)

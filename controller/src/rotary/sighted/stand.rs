@@ -10,7 +10,6 @@ use crate::rotary::placement::LOOK_EVERY;
 use crate::rotary::table::RotaryTable;
 
 /// How long nothing has to be done where there is no machine.
-#[cfg(feature = "program")]
 pub(super) const IDLE: Duration = Duration::from_secs(1);
 
 /// A table that is brought to a line's nominal angle, or that nobody but the person turns.
@@ -36,35 +35,9 @@ pub(super) trait Stand {
     fn now_s(&self) -> f64;
 }
 
-/// No machine: what is typed says where the table is.
-#[cfg(feature = "program")]
-pub(super) struct Alone;
-
-#[cfg(feature = "program")]
-impl Stand for Alone {
-    fn turns(&self) -> bool {
-        false
-    }
-
-    fn go_to(&mut self, _: Radians, _: Approach, _: Radians) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    fn beyond(&self, _: Radians) -> Result<Radians, Failure> {
-        Ok(Radians::ZERO)
-    }
-
-    fn live(&mut self) -> Result<Duration, Failure> {
-        Ok(IDLE)
-    }
-
-    fn now_s(&self) -> f64 {
-        0.0
-    }
-}
-
-/// A table that a person turns by hand: its drive is off, and what is typed says where it is. Its machine lives on.
-pub(super) struct ByHand<'s, 't>(pub(super) &'s mut RotaryTable<'t>);
+/// A table that a person turns by hand: its drive is off, and what is typed says where it is. The machine lives on,
+/// where it is there.
+pub(super) struct ByHand<'s, 't>(pub(super) Option<&'s mut RotaryTable<'t>>);
 
 impl Stand for ByHand<'_, '_> {
     fn turns(&self) -> bool {
@@ -80,11 +53,11 @@ impl Stand for ByHand<'_, '_> {
     }
 
     fn live(&mut self) -> Result<Duration, Failure> {
-        self.0.live()
+        self.0.as_mut().map_or(Ok(IDLE), |it| it.live())
     }
 
     fn now_s(&self) -> f64 {
-        self.0.now_s()
+        self.0.as_ref().map_or(0.0, |it| it.now_s())
     }
 }
 
