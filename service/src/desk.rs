@@ -43,6 +43,8 @@ pub struct Desk {
 struct Shared {
     board: Board,
     fixed: Arc<Fixed>,
+    /// What the numbers of events count from.
+    events_from: u64,
     ledger: Mutex<Ledger>,
     store: Store,
     /// Who makes a page of a journal.
@@ -87,6 +89,7 @@ impl Desk {
         let shared = Shared {
             board,
             fixed,
+            events_from: ledger.events_from(),
             ledger: Mutex::new(ledger),
             store,
             page,
@@ -420,7 +423,10 @@ impl Desk {
 
     /// The machine.
     pub fn machine(&self) -> MachineView {
-        self.snapshot().machine_of(&self.shared.fixed)
+        MachineView {
+            newest_event: self.newest_event(),
+            ..self.snapshot().machine_of(&self.shared.fixed)
+        }
     }
 
     /// Its axes.
@@ -441,8 +447,18 @@ impl Desk {
     /// The events after number `after`, as far as they are kept.
     pub fn events(&self, after: u64) -> Vec<Event> {
         let snapshot = self.snapshot();
-        let newer = snapshot.events.iter().filter(|it| it.id > after);
-        newer.map(|it| Event::clone(it)).collect()
+        let from = self.shared.events_from;
+        let newer = snapshot.events.iter().filter(|it| from + it.id > after);
+        let numbered = newer.map(|it| Event {
+            id: from + it.id,
+            ..Event::clone(it)
+        });
+        numbered.collect()
+    }
+
+    /// The number of the newest event.
+    pub(crate) fn newest_event(&self) -> u64 {
+        self.shared.events_from + self.snapshot().newest_event()
     }
 
     /// How punctual SYNCs are, how full the buses, how warm it is; at most a second old.

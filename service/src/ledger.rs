@@ -104,6 +104,13 @@ impl Ledger {
         format!("{kind}{}-{}", self.boot, self.motions)
     }
 
+    /// What numbers of events count from in this life of the service: none is used twice, so that whoever goes on with one
+    /// of an earlier life hears that he has missed some.
+    pub(crate) const fn events_from(&self) -> u64 {
+        // Four thousand million events for each life, and two million lives before numbers of JavaScript end.
+        (self.boot - 1) << 32
+    }
+
     /// The motion that was asked for with `key`.
     pub(crate) fn of_key(&self, key: &str) -> Option<&Asked> {
         let mut asked = self.asked.iter().rev();

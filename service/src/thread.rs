@@ -256,7 +256,7 @@ impl Kept {
             return;
         }
         let failure = self.machine.explain(failure);
-        self.keeper.borrow_mut().begin_fault(cause_of(&failure));
+        self.keeper.borrow_mut().begin_fault(&failure);
         self.machine.make_safe();
         self.keeper.borrow_mut().end_fault(&self.machine);
     }

@@ -79,11 +79,11 @@ pub(super) async fn events(
     })?;
     let resumed = headers.get("last-event-id").and_then(|it| it.to_str().ok());
     let resumed = resumed.and_then(|it| it.parse().ok()).or(wanted.after);
-    let known = shared.desk.snapshot().newest_event();
+    let known = shared.desk.newest_event();
     let newest = match resumed {
         None => known,
         Some(heard) if heard <= known => heard,
-        // Heard from a service that has been started again since: everything is new.
+        // Never heard from this service: everything is new.
         Some(_) => 0,
     };
     let every = sampled(wanted.sample_ms)?;

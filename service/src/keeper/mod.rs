@@ -228,8 +228,12 @@ impl Keeper {
     }
 
     /// Everything that was under way fails with `cause` when the machine has been made safe.
-    pub(crate) fn begin_fault(&mut self, cause: Cause) {
-        let cause = Arc::new(cause);
+    pub(crate) fn begin_fault(&mut self, failure: &truestage::Failure) {
+        let cause = Arc::new(cause_of(failure));
+        self.motions.is_about(match failure {
+            truestage::Failure::Machine(failure) => failure.device(),
+            _ => None,
+        });
         self.fault = Some(Arc::clone(&cause));
         self.set_mode(Mode::Safe);
         self.events.push("machine", "", json!({"cause": &*cause}));

@@ -17,6 +17,7 @@ use truestage::linear::Corrected;
 use units::Time;
 
 use self::going::{Going, Wanted};
+use self::jog::HeldBack;
 use self::together::Together;
 use super::Keeper;
 use super::seat::{Seat, Task};
@@ -24,7 +25,7 @@ use super::stop::{cause_of, stopped_by};
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
 use crate::request::JogRequest;
-use crate::view::{Cause, MotionView, Stopped};
+use crate::view::{Cause, MotionState, MotionView, Stopped};
 
 /// So many that have ended are kept in the snapshot.
 const ENDED_KEPT: usize = 256;
@@ -78,6 +79,8 @@ struct Leg {
     /// Where it was asked to go.
     target: Coordinate,
     going: Option<Going>,
+    /// How long it may take, and until when.
+    limit: Duration,
     deadline: Time,
     phase: LegPhase,
 }
@@ -103,6 +106,8 @@ pub(super) struct Motion {
     dead_man: Option<(Duration, Time)>,
     /// Whose jog it is, and how fast; a jog has no target and no time in which it has to be anywhere.
     jog: Option<JogRequest>,
+    /// Whoever jogs has let go of it.
+    is_released: bool,
     legs: Vec<Leg>,
     /// Its axes move as one: then it has no legs.
     together: Option<Together>,
@@ -134,10 +139,19 @@ pub(super) struct Motions {
     /// In the order in which they were accepted.
     active: Vec<Motion>,
     ended: VecDeque<Arc<MotionView>>,
+    /// The device that the fault is about which ends them all.
+    about: Option<String>,
+    /// Who has not let go of a jog that was ended.
+    held_back: Vec<HeldBack>,
     published: Option<Arc<Vec<Arc<MotionView>>>>,
 }
 
 impl Motions {
+    /// The fault that ends them all is about `device`.
+    pub(super) fn is_about(&mut self, device: Option<&str>) {
+        self.about = device.map(str::to_owned);
+    }
+
     /// Whether the procedure that runs is one of theirs, and has to end.
     pub(super) fn is_to_end(&self) -> bool {
         let mut active = self.active.iter();
@@ -211,11 +225,14 @@ impl Keeper {
             let seat = &mut self.seats[leg.at];
             let by_way_of = going.by_way_of();
             let moves = 1 + u32::from(by_way_of.is_some());
-            let limit = seat.move_timeout * moves + SETTLING;
-            let limit = machine.patience().of(limit);
+            // What a slow or long way takes is no sign that anything is wrong.
+            let lasts = going.lasts(machine, seat).unwrap_or_default();
+            let limit = lasts + seat.move_timeout * moves + SETTLING;
+            let limit = machine.patience().of(limit) + seat.in_position;
+            leg.limit = limit;
             let id = Arc::clone(&motion.id);
             (leg.deadline, seat.task) = match motion.jog {
-                None => (machine.now() + limit + seat.in_position, Task::Motion(id)),
+                None => (machine.now() + limit, Task::Motion(id)),
                 Some(_) => (Time::NEVER, Task::Jog(id)),
             };
             seat.target = Some(going.target(leg.target));
@@ -290,7 +307,7 @@ impl Keeper {
         let mut late = legs.iter();
         let late = late.find(|it| it.phase != LegPhase::There && now >= it.deadline);
         if let Some(leg) = late {
-            let (at, waited) = (leg.at, self.seats[leg.at].move_timeout);
+            let (at, waited) = (leg.at, leg.limit);
             let end = End::TimedOut(self.overdue(at, "move", waited));
             self.stop_motion(machine, number, end);
         }
@@ -369,10 +386,14 @@ impl Keeper {
         }
     }
 
-    /// Every motion fails. What was overdue is the one that a procedure made, if there is one: others were in time.
+    /// Every motion fails. What was overdue is the one that a procedure made, or the one of the axis that was too slow:
+    /// others were in time.
     pub(super) fn fail_motions(&mut self, machine: &Machine, cause: &Cause) {
         while let Some(motion) = self.motions.active.first() {
-            let end = match motion.is_broken_off() {
+            let slow = self.motions.about.as_deref();
+            let is_slow = matches!(motion.phase, Phase::Moving)
+                && motion.axes().any(|at| Some(&*self.seats[at].name) == slow);
+            let end = match motion.is_broken_off() || is_slow {
                 true => End::by(cause.clone()),
                 false => End::Failed(cause.clone()),
             };
@@ -406,6 +427,9 @@ impl Keeper {
         self.motions.published = None;
         self.publish(machine);
         let motion = self.motions.active.remove(number);
+        if view.state == MotionState::Stopped {
+            self.hold_back(machine.now(), &motion);
+        }
         let cause = view.cause.clone().map(Arc::new);
         for at in motion.axes() {
             let seat = &mut self.seats[at];

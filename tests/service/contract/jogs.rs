@@ -371,3 +371,43 @@ fn what_a_platform_cannot_do_is_not_jogged() {
         bed.ended(&moving);
     });
 }
+
+/// A held key asks again and again: it must not undo a stop, and a renewal that came too late must not begin anew.
+#[test]
+fn a_jog_that_was_ended_does_not_begin_again_until_its_key_is_let_go() {
+    with_zeroed_stage(|bed| {
+        let begins_again = |by: &str| {
+            let id = bed.jogs(&jog(2.0));
+            assert_eq!(bed.now(&id).state, MotionState::Moving, "after {by}");
+            bed.client.stop(&anna(), StopMode::Controlled).unwrap();
+            bed.ended(&id);
+            bed.let_time_pass(0.5);
+        };
+        for (name, ends) in [
+            (
+                "a stop",
+                &(|| drop(bed.client.stop(&bert(), StopMode::Controlled))) as &dyn Fn(),
+            ),
+            ("a late renewal", &|| bed.let_time_pass(0.25)),
+        ] {
+            let id = bed.keeps_jogging(&jog(2.0), 0.3);
+            ends();
+            while bed.now(&id).state != MotionState::Stopped {
+                bed.let_time_pass(0.01);
+            }
+            let here = bed.encoder_mm("x");
+            for _ in 0..10 {
+                let held = bed.client.jog(&anna(), &jog(2.0)).unwrap_err();
+                assert!(held.to_string().contains("let go of it"), "{held}");
+                bed.let_time_pass(0.15);
+            }
+            assert!(
+                (bed.encoder_mm("x") - here).abs() < 1e-3,
+                "it moved after {name}"
+            );
+            bed.let_time_pass(0.5);
+            begins_again(name);
+        }
+        bed.lets_go();
+    });
+}

@@ -1,13 +1,16 @@
 //! Lines 1 to 5, 7 and 8: how motions end.
 
+use std::path::Path;
+
 use mock_bus::fault::Fault;
 use service::{AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest, StopMode};
-use tests::{Edit, LINEAR};
+use tests::{Edit, LINEAR, Shipped};
+use units::MetresPerSecond;
 
 use super::together::path;
 use super::{
     Bed, SEED, anna, bert, compensated, each, length, slowly, to, with_stage, with_three_axes,
-    with_zeroed_stage, with_zeroed_stage_in_process,
+    with_zeroed_stage, with_zeroed_stage_in_process, zeroed,
 };
 use crate::stage::Stage;
 
@@ -203,17 +206,23 @@ fn after_a_fault_a_reset_and_a_new_zero_make_the_axis_usable() {
 /// Line 1, the fourth end: what does not get there in time is stopped and says so.
 #[test]
 fn a_motion_that_takes_too_long_is_stopped_and_timed_out() {
+    // A drive that keeps to a limit of its own, which the configuration does not know.
+    let limit = |mm_per_s: f64| format!("max_profile_velocity_mm_per_s = {mm_per_s:.1}");
+    let emulated = LINEAR.emulated.edit(&limit(1000.0), &limit(3.0));
+    let shipped = Shipped {
+        emulated: Box::leak(emulated.into_boxed_str()),
+        ..LINEAR
+    };
     each(
-        |rig, folder| Stage::new(rig, (LINEAR, SEED), folder, |text| text),
+        |rig, folder| Stage::new(rig, (shipped, SEED), folder, |text| text),
         |bed| {
             bed.client.zero(&anna(), None);
-            let id = bed.begin(&slowly("x", 30.0));
-            let view = bed.ended(&id);
+            let view = bed.ended(&bed.begin(&to("x", 55.0)));
             assert_eq!(view.state, MotionState::TimedOut, "{view:?}");
             assert_eq!(view.cause.unwrap().code, Code::Overdue);
-            assert!(bed.encoder_mm("x") < 10.0);
+            assert!(bed.encoder_mm("x") < 50.0);
             let axis = bed.client.axis("x").unwrap();
-            assert_eq!(axis.state, AxisState::Standstill, "it was stopped");
+            assert_eq!(axis.state, AxisState::ErrorStop, "it was stopped");
         },
     );
 }
@@ -403,4 +412,25 @@ fn beyond_the_calibrated_range_no_axis_goes_unasked() {
         assert_eq!(ended.state, MotionState::Done);
         assert_ne!(ended.axes["x"].corrected, "yes");
     });
+}
+
+/// `move_timeout_s` (10 s) is for what an axis does at its own speed.
+#[test]
+fn a_slow_motion_has_the_time_that_its_way_takes_and_one_without_an_end_is_refused() {
+    let unpatient = |rig, folder: &Path| Stage::new(rig, (LINEAR, SEED), folder, |text| text);
+    each(
+        unpatient,
+        zeroed(|bed: &Bed<'_>| {
+            let at = |speed: f64| MoveRequest {
+                speed: Some(MetresPerSecond(speed).into()),
+                ..to("x", 10.0)
+            };
+            let view = bed.ended(&bed.begin(&at(0.5e-3)));
+            assert_eq!(view.state, MotionState::Done, "{view:?}");
+            let back = bed.ended(&bed.begin(&to("x", 0.0)));
+            assert_eq!(back.state, MotionState::Done);
+            let refused = bed.refused(&at(1e-30), Code::Refused);
+            assert!(refused.to_string().contains("24 h"), "{refused}");
+        }),
+    );
 }

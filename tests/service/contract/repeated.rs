@@ -49,6 +49,7 @@ fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_n
             client: &*client,
         }
         .ended(&first);
+        let heard = client.machine().newest_event;
         drop(client);
         stage.end();
 
@@ -58,6 +59,12 @@ fn after_a_restart_the_same_request_has_the_end_that_was_written_down_and_does_n
             stage: &stage,
             client: &*client,
         };
+        let events = client.events(heard);
+        assert!(
+            events[0].id > heard + 1,
+            "whoever goes on with what he heard hears of a gap: {:?}",
+            events[0]
+        );
         client.zero(&anna(), None);
         let again = client.begin(&anna(), &to("x", 10.0), Some("key")).unwrap();
         assert_eq!(again, first);

@@ -146,3 +146,18 @@ fn a_calibrated_table_is_corrected_and_says_how_uncertain_that_is() {
         assert!((encoder - 123.4).abs() * 3600.0 > 0.05, "{encoder}");
     });
 }
+
+#[test]
+fn turns_without_end_are_refused_and_the_table_goes_on_as_it_was() {
+    with_table(|bed| {
+        for degrees in [1e7, -1e12, 1e300] {
+            let far = MoveRequest {
+                way: Some(WayName::Turns),
+                ..turned(degrees)
+            };
+            let refused = bed.refused(&far, Code::Refused);
+            assert!(refused.to_string().contains("24 h"), "{refused}");
+        }
+        assert!((bed.turns_to(&turned(10.0)) - 10.0).abs() < 0.01);
+    });
+}

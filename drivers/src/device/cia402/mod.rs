@@ -161,6 +161,8 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     outcome: Option<Result<(), DeviceError>>,
     alarms: VecDeque<Alarm>,
     short_pdos: u64,
+    /// So often it was still enabled at a start.
+    left_enabled: u64,
     repeated_commands: u64,
 }
 
@@ -217,6 +219,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             outcome: None,
             alarms: VecDeque::new(),
             short_pdos: 0,
+            left_enabled: 0,
             repeated_commands: 0,
         }
     }
@@ -457,6 +460,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
     fn counters(&self) -> Vec<(&'static str, u64)> {
         let mut counters = self.node.counters();
         counters.push(("pdos too short", self.short_pdos));
+        counters.push(("found enabled, and stopped", self.left_enabled));
         counters.push(("positions not believed", self.image.plausible.rejected()));
         counters.push(("commands repeated", self.repeated_commands));
         if self.settings.latch.is_some() {

@@ -145,8 +145,18 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         (self.first, self.compared) = (None, None);
         self.node.up(now);
         self.commanded_mode = Some(OperationMode::ProfilePosition);
-        self.finish(Ok(()));
+        match sample.status.state() {
+            PowerState::OperationEnabled => self.stop_what_was_left(now),
+            _ => self.finish(Ok(())),
+        }
         self.take_sample(now, sample);
+    }
+
+    /// Whoever had the drive before is gone, and what he began goes on: now that it hears heartbeats again, its own watch
+    /// would never end it. The start is done when it is off.
+    fn stop_what_was_left(&mut self, now: Time) {
+        self.left_enabled += 1;
+        self.begin_quick_stop(now);
     }
 
     fn supervise(&mut self, sample: &Sample) {

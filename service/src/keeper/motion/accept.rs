@@ -74,6 +74,7 @@ impl Keeper {
                 at: self.place(axis)?,
                 target: *target,
                 going: None,
+                limit: Duration::ZERO,
                 deadline: Time::NEVER,
                 phase: LegPhase::Waiting,
             })
@@ -94,6 +95,7 @@ impl Keeper {
             },
             dead_man: dead_man.map(|it| (it, now + it)),
             jog: None,
+            is_released: false,
             legs,
             together,
             phase: Phase::Queued,
@@ -105,11 +107,15 @@ impl Keeper {
         if let Some(together) = &motion.together {
             return self.judge_together(machine, together);
         }
-        let wanted = motion.wanted;
+        let (wanted, is_jog) = (motion.wanted, motion.jog.is_some());
         let is_round = |leg: &Leg| matches!(leg.going, Some(Going::Round(_)));
         motion.legs.iter_mut().try_for_each(|leg| {
             let seat = &self.seats[leg.at];
-            leg.going = Some(Going::plan(machine, seat, leg.target, wanted)?);
+            let going = Going::plan(machine, seat, leg.target, wanted)?;
+            if !is_jog {
+                going.require_an_end(machine, seat)?;
+            }
+            leg.going = Some(going);
             Ok::<_, Problem>(())
         })?;
         match wanted.way {

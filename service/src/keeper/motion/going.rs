@@ -1,5 +1,7 @@
 //! What one axis of a motion is sent, by what it is: along a way, or round and round.
 
+use core::time::Duration;
+
 use machine::{Driving, Failure, Machine, Moving};
 use truestage::linear::{Corrected, PlannedMove};
 use truestage::rotary::{PlannedTurn, Way};
@@ -12,6 +14,9 @@ use super::super::seat::Seat;
 use super::speed;
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
+
+/// So long may an axis be on its way, in hours.
+const LONGEST_H: u64 = 24;
 
 /// What an axis is to do: everything has been judged.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +80,38 @@ impl Going {
             Self::Along(it) => it.set_point.into(),
             Self::Round(it) => it.set_point.into(),
         }
+    }
+
+    /// # Errors
+    /// When nobody can mean to wait for its end.
+    pub(super) fn require_an_end(&self, machine: &Machine, seat: &Seat) -> Result<(), Problem> {
+        if self.lasts(machine, seat).is_some() {
+            return Ok(());
+        }
+        let axis = &seat.name;
+        let what = format!(
+            "axis {axis} would be on its way for more than {LONGEST_H} h; nothing was moved"
+        );
+        let help = "give a nearer target, or a higher speed";
+        Err(Problem::new(Code::Refused, what, help))
+    }
+
+    /// How long its way takes from where the axis of `seat` is, by the speed alone; `None`: longer than anything may.
+    pub(super) fn lasts(&self, machine: &Machine, seat: &Seat) -> Option<Duration> {
+        let (way, speed) = match self {
+            Self::Along(it) => {
+                let reading = machine.reading(&seat.name).ok().flatten();
+                let here = reading.map_or(it.set_point, |it| it.position);
+                ((it.set_point - here).value(), it.speed.value())
+            }
+            Self::Round(it) => {
+                let reading = machine.devices().rotary_reading(&seat.name).ok().flatten();
+                let here = reading.map_or(it.set_point, |it| it.position);
+                ((it.set_point - here).value(), it.speed.value())
+            }
+        };
+        let lasts = Duration::try_from_secs_f64(way.abs() / speed).ok();
+        lasts.filter(|it| *it <= Duration::from_secs(LONGEST_H * 3600))
     }
 
     /// Whether a calibration corrects it.

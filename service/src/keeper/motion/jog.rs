@@ -5,7 +5,7 @@ use core::time::Duration;
 use machine::Machine;
 use truestage::Failure;
 use truestage::runs::Moved;
-use units::{Approach, AxisSpeed, Radians};
+use units::{Approach, AxisSpeed, Radians, Time};
 
 use super::super::Keeper;
 use super::super::mechanics::Mechanics;
@@ -18,6 +18,9 @@ use crate::request::{JogRequest, MoveRequest, WayName};
 
 /// A jog that was not renewed for so long stops.
 const DEAD_MAN: Duration = Duration::from_millis(200);
+
+/// Whoever asks for no jog for so long has let go of the key: two renewals that did not come.
+const LET_GO: Duration = Duration::from_millis(400);
 
 /// What is jogged.
 #[derive(Clone, Copy)]
@@ -49,6 +52,7 @@ impl Keeper {
         if request.speed.0.value() == 0.0 {
             return self.end_jog(machine, going, by, &request.axis);
         }
+        self.require_let_go(machine.now(), by, &request.axis)?;
         self.require_no_hands()?;
         let motion = self.jog_motion(machine, (id, by), request, subject)?;
         match going {
@@ -163,8 +167,47 @@ impl Keeper {
 
     fn stop_jog(&mut self, machine: &mut Machine, number: usize, by: &str) {
         let stopped = stopped_by(by);
+        self.motions.active[number].is_released = true;
         self.stop_motion(machine, number, End::Stopped(stopped));
     }
+
+    /// A jog that ended although its key is still held does not begin again by itself: neither after a stop, whoever made it,
+    /// nor after a dead-man that was renewed too late.
+    pub(super) fn hold_back(&mut self, now: Time, motion: &Motion) {
+        if let Some(jog) = motion.jog.as_ref().filter(|_| !motion.is_released) {
+            self.motions.held_back.push(HeldBack {
+                axis: jog.axis.clone(),
+                by: motion.by.clone(),
+                until: now + LET_GO,
+            });
+        }
+    }
+
+    /// # Errors
+    /// As long as `by` asks for a jog of `axis` that was ended, again and again.
+    fn require_let_go(&mut self, now: Time, by: &str, axis: &str) -> Result<(), Problem> {
+        let held_back = &mut self.motions.held_back;
+        held_back.retain(|it| now < it.until);
+        let held = held_back.iter_mut();
+        let Some(held) = held.rev().find(|it| it.axis == axis && it.by == by) else {
+            return Ok(());
+        };
+        held.until = now + LET_GO;
+        let what = format!("the jog of axis {axis} was ended while its key was held");
+        let help = format!(
+            "let go of it: ask for none for {} ms, and then anew",
+            LET_GO.as_millis()
+        );
+        Err(Problem::new(Code::AxisBusy, what, help))
+    }
+}
+
+/// Whose jog was ended while he held its key, and until when he has not let go of it.
+#[derive(Debug)]
+pub(super) struct HeldBack {
+    axis: String,
+    by: String,
+    until: Time,
 }
 
 /// The motion of an axis by itself, to its soft limit, or where the drive of one that turns counts no further.
