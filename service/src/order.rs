@@ -42,7 +42,7 @@ pub(crate) enum Order {
     Abort { run: String },
     /// A run ends where it is, to go on later.
     Pause { run: String },
-    /// A paused run goes on.
+    /// A run that ended before its result goes on.
     Resume { run: String },
     /// A person answers the question of a run.
     Answer {

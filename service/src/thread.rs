@@ -6,14 +6,14 @@ use core::time::Duration;
 use std::any::Any;
 use std::cell::RefCell;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use machine::attend;
-use machine::records::Store;
+use machine::records::{AnyLog, Store, read_journal};
 use triple_buffer::Input;
 use truestage::runs::{Choice, Found, Group, Teller};
 use truestage::{Failure, Machine, groups};
@@ -380,6 +380,9 @@ impl Kept {
         let result = self.perform(&task);
         self.machine.leave_instrument();
         self.keeper.borrow_mut().end_procedure(id);
+        if result.is_err() {
+            self.leave(&task, before);
+        }
         match result {
             // The next tick ends the service.
             Err(_) if self.machine.stop_request().is_requested() => {}
@@ -390,7 +393,6 @@ impl Kept {
             Err(failure) if failure.is_stop() => {
                 // What it found may be stored, and in use.
                 self.load_courses();
-                self.leave(&task, before);
                 let mut keeper = self.keeper.borrow_mut();
                 keeper.run_interrupted(&mut self.machine, id);
             }
@@ -427,7 +429,7 @@ impl Kept {
     /// began: that of an earlier run.
     fn leave(&mut self, task: &RunTask, before: Option<PathBuf>) {
         let begun = match &task.resume {
-            Some(journal) => Some(journal.clone()),
+            Some(journal) => Some(journal.clone()).filter(|it| is_incomplete(it)),
             None if task.is_resumed => {
                 let newest = self.newest_journal(task);
                 newest.filter(|it| before.as_ref() != Some(it))
@@ -465,6 +467,11 @@ impl Kept {
         task.group
             .perform(machine, store, &procedure, &mut person, teller)
     }
+}
+
+/// Whether a run can go on with `journal`.
+fn is_incomplete(journal: &Path) -> bool {
+    read_journal::<AnyLog>(journal).is_ok_and(|it| !it.complete)
 }
 
 /// How people call a group.

@@ -354,7 +354,11 @@ pub struct RunView {
     pub steps_done: u64,
     /// Of so many.
     pub steps: u64,
-    /// Whether it can be paused, and go on with what it measured.
+    /// How often this service has begun it: more than once where it went on after a pause or another end.
+    #[serde(default)]
+    pub begun: u32,
+    /// Whether it can be paused, and go on with what it measured; of one that was stopped, has failed or timed out, whether
+    /// it can go on with what its `journal` has.
     #[serde(default)]
     pub can_resume: bool,
     /// What it waits for a person to do, when it does.
@@ -385,7 +389,7 @@ pub struct RunView {
     /// Calibrate: its verification shows that what was stored makes the machine worse.
     #[serde(default)]
     pub made_worse: bool,
-    /// Where one that ended before its result has what it measured.
+    /// Where one that ended before its result has what it measured, as far as it can go on with that.
     #[serde(default)]
     pub journal: Option<String>,
 }
@@ -430,6 +434,7 @@ impl RunView {
             plan,
             steps_done: 0,
             steps: 0,
+            begun: 0,
             can_resume: false,
             question: None,
             said: Vec::new(),

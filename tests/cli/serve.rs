@@ -310,6 +310,14 @@ fn a_signal_to_the_client_stops_everything_where_somebody_else_has_the_lease() {
         }
         let status = bench.run(&["status"]).with_code(0);
         assert_eq!(status["axes"][0]["state"], "Standstill", "{status}");
+        // What ended it does not matter: it goes on, as without a service.
+        let token = lease["token"].as_str().expect("a token");
+        let words = ["calibrate", "machine.toml", "--resume"];
+        say_with_lease(&bench, &words, token);
+        let (_, runs) = ask(bench.folder(), "GET /v1/runs", &json!({}));
+        let last = runs.as_array().and_then(|it| it.last()).expect("a run");
+        let told = (&last["kind"], &last["state"], &last["begun"]);
+        assert_eq!(told, (&json!("calibrate"), &json!("done"), &json!(2)));
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }

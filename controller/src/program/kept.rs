@@ -7,6 +7,7 @@ mod calibrated;
 mod files;
 mod heard;
 mod jobs;
+mod left;
 mod memories;
 mod motions;
 mod reset;
@@ -26,7 +27,7 @@ use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::rotary::readings::is_turned_by_hand;
 use crate::program::session::stop_on_signals;
-use crate::program::{AskArgs, AxisArgs, MachineArgs, NEWEST_RUN, VerifyArgs};
+use crate::program::{AskArgs, AxisArgs, MachineArgs, VerifyArgs};
 use crate::runs::Choice;
 use heard::Heard;
 use machine::{Observer as _, Stage, StopRequest};
@@ -166,7 +167,7 @@ impl Service {
         self.run(Stage::Zero, json!({"axis": axis}), None, waiting)
     }
 
-    /// Begins a run, or goes on with the one that is paused, and waits for its result; the service names runs as people
+    /// Begins a run, or goes on with one that ended before its result, and waits for its result; the service names runs as people
     /// name their stages.
     fn run(
         &self,
@@ -194,7 +195,7 @@ impl Service {
                 ask(&self.at, "POST", "/v1/runs", &request.to_string())?,
                 "start",
             ),
-            Some(journal) => (self.paused(&request, journal)?, "resume"),
+            Some(journal) => (self.left(&request, journal)?, "resume"),
         };
         let path = format!("/v1/runs/{}", plain(run["id"].as_str().unwrap_or_default()));
         let begun = waiting.person(&run["plan"]).and_then(|person| {
@@ -254,27 +255,6 @@ impl Service {
             true => person.refuse(&refused.to_string()),
             false => Ok(()),
         }
-    }
-
-    /// The newest run that is paused and of the kind and axis that `request` asks for; or the one of
-    /// `journal`, where a file is named.
-    fn paused(&self, request: &Value, journal: &Path) -> Result<Value, Failure> {
-        let runs = ask(&self.at, "GET", "/v1/runs", "")?;
-        let is_meant = |run: &&Value| {
-            let of_axis = request["axis"].is_null() || run["of"] == request["axis"];
-            let left = run["journal"].as_str().map(Path::new);
-            let of_journal = journal == Path::new(NEWEST_RUN)
-                || left.is_some_and(|it| it.file_name() == journal.file_name());
-            run["state"] == "paused" && run["kind"] == request["kind"] && of_axis && of_journal
-        };
-        let found = runs.as_array().into_iter().flatten().rfind(is_meant);
-        found.cloned().ok_or_else(|| Failure::Usage {
-            what: format!(
-                "the service knows no {} run that was interrupted and can go on",
-                plain(request["kind"].as_str().unwrap_or_default())
-            ),
-            help: "start a new one without --resume".into(),
-        })
     }
 
     /// The name of what was begun.
@@ -428,8 +408,14 @@ fn refuse(is_given: bool, option: &str) -> Result<(), Failure> {
 
 fn stopped(seen: &Value) -> Failure {
     let by = plain(seen["stopped"]["by"].as_str().unwrap_or("somebody"));
+    let goes_on = match (&seen["can_resume"], seen["journal"].as_str()) {
+        (Value::Bool(true), Some(journal)) => {
+            format!("; go on with --resume ({})", plain(journal))
+        }
+        _ => String::new(),
+    };
     Failure::Kept {
-        said: format!("stopped by {by}; the axes stand"),
+        said: format!("stopped by {by}; the axes stand{goes_on}"),
         exit_code: machine::Failure::Interrupted.exit_code(),
     }
 }

@@ -76,10 +76,10 @@ impl Desk {
         self.done(caller, Order::Pause { run })
     }
 
-    /// The paused run `id` goes on with what it measured.
+    /// The run `id`, which was paused or stopped, has failed or timed out, goes on with what its journal has.
     ///
     /// # Errors
-    /// When there is none, it is not paused, an axis is in use or has no zero.
+    /// When there is none, it cannot go on, an axis is in use or has no zero.
     pub fn resume_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
         let run = id.to_owned();
         self.done(caller, Order::Resume { run })

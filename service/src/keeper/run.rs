@@ -64,7 +64,7 @@ impl Keeper {
             self.plan_of(RunKind::Verify, None, at)?;
         }
         let plan = judged.as_ref().map_or(plan, plan_along);
-        self.runs.require_room_for(judged.as_ref())?;
+        self.runs.make_room_for(judged.as_ref())?;
         let grouped = &self.groups[at];
         let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
         let task = Task {
@@ -128,9 +128,28 @@ impl Keeper {
         }
         self.job = Some(Job::Run(id.into()));
         let run = self.runs.find(id)?;
-        (run.is_pausing, run.is_over) = (false, false);
-        self.change_run(id, |view| view.state = RunState::Running);
+        (run.is_pausing, run.is_over, run.stopped) = (false, false, None);
+        let journal = run.task.resume.clone();
+        self.change_run(id, |view| {
+            view.state = RunState::Running;
+            view.begun += 1;
+            (view.stopped, view.cause) = (None, None);
+        });
+        if let Some(journal) = journal {
+            self.give_up_others(id, &paused::text(&journal));
+        }
         Ok(())
+    }
+
+    /// The run `id` goes on with `journal`: no other one does.
+    fn give_up_others(&mut self, id: &str, journal: &str) {
+        for paused in self.runs.give_up_others(id, journal) {
+            let stopped = stopped_by(format!("run {id}, which goes on with its journal"));
+            self.change_run(&paused, |view| {
+                view.state = RunState::Stopped;
+                view.stopped = Some(stopped);
+            });
+        }
     }
 
     /// Ends the run `id`.
@@ -336,9 +355,7 @@ impl Keeper {
             return;
         };
         change(&mut run.view);
-        if run.view.state.is_end() {
-            run.task.judged = None;
-        }
+        run.let_go();
         let data = run.view.changed();
         self.events.push("run", id, data);
     }

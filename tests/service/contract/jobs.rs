@@ -133,8 +133,8 @@ fn a_job_that_is_paused_goes_on_at_the_point_that_was_not_left_and_as_the_same_j
         bed.client.pause(&bert(), &id).unwrap();
         let paused = bed.asks_or_ends(&id);
         assert_eq!(paused.state, RunState::Paused, "{paused:?}");
-        let journal = paused.journal.expect("points were reached");
-        let journal = std::path::Path::new(&journal).file_stem().unwrap();
+        let journal = paused.journal.as_ref().expect("points were reached");
+        let journal = std::path::Path::new(journal).file_stem().unwrap();
         let anew = |text: &str| RunRequest {
             resume: Some(journal.to_string_lossy().into_owned()),
             ..job(text)
@@ -148,7 +148,11 @@ fn a_job_that_is_paused_goes_on_at_the_point_that_was_not_left_and_as_the_same_j
         assert_eq!(bed.asked(&id).number, 3);
         bed.client.abort(&bert(), &id).unwrap();
         let run = bed.client.run(&id, PATIENCE).unwrap();
-        assert_eq!(run.state, RunState::Stopped, "{run:?}");
+        assert_eq!(
+            (run.state, run.can_resume),
+            (RunState::Stopped, true),
+            "{run:?}"
+        );
         let id = bed.client.plan(&anna(), &anew(JOB)).unwrap();
         bed.client.start(&anna(), &id).unwrap();
         bed.asked(&id);
@@ -159,6 +163,11 @@ fn a_job_that_is_paused_goes_on_at_the_point_that_was_not_left_and_as_the_same_j
             (&run.result["points_before"], &run.result["points"]),
             (&2.into(), &2.into())
         );
+        // What another run went on with is not gone on with twice.
+        let first = bed.client.run(&paused.id, Duration::ZERO).unwrap();
+        assert!(!first.can_resume, "{first:?}");
+        let twice = bed.client.resume(&anna(), &first.id).unwrap_err();
+        assert_eq!(twice.code, Code::RunState, "{twice}");
     });
 }
 

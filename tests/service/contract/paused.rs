@@ -1,12 +1,15 @@
-//! Runs that end where they are, and go on: when somebody asks for that, and after a restart.
+//! Runs that end before their result, and go on: when somebody asks for that, whatever ended them, and after a restart.
 
 use core::time::Duration;
 
-use service::{AxisState, Code, MotionState, RunKind, RunRequest, RunState, RunView};
+use mock_bus::fault::Fault;
+use service::{
+    AxisState, Code, MachineState, MotionState, RunKind, RunRequest, RunState, RunView, StopMode,
+};
 use tests::LINEAR;
 
-use super::runs::short;
-use super::{Bed, SEED, anna, bert, each, meetings, to, zeroed};
+use super::runs::{fewer, lenient, short};
+use super::{Bed, SEED, anna, bert, each, each_here, meetings, to, zeroed};
 use crate::client::PATIENCE;
 use crate::stage::Stage;
 
@@ -27,6 +30,41 @@ impl Bed<'_> {
             self.let_time_pass(0.05);
         }
         id
+    }
+
+    /// The run `id`, which has ended so and goes on, and how many points its journal has.
+    fn has_left(&self, id: &str, state: RunState) -> (RunView, usize) {
+        let run = self.client.run(id, PATIENCE).expect("it was planned");
+        assert_eq!((run.state, run.can_resume), (state, true), "{run:?}");
+        let journal = run.journal.as_ref().expect("it says where its points are");
+        let kept = points_in(journal);
+        assert!((A_RUN as usize..28).contains(&kept), "{kept} points");
+        (run, kept)
+    }
+
+    /// It goes on with what it has, and not twice.
+    fn goes_on(&self, left: &RunView, kept: usize) {
+        self.client.resume(&anna(), &left.id).unwrap();
+        let run = self.run_now(&left.id);
+        assert_eq!((&run.stopped, &run.cause), (&None, &None), "{run:?}");
+        assert_eq!(run.begun, left.begun + 1);
+        let twice = self.client.resume(&anna(), &left.id).unwrap_err();
+        assert_eq!(twice.code, Code::RunState, "{twice}");
+        let done = self.client.run(&left.id, PATIENCE).unwrap();
+        assert_eq!((done.state, done.can_resume), (RunState::Done, false));
+        let journal = left.journal.as_deref().expect("it was told");
+        assert_eq!(done.result["journal"], journal);
+        assert_eq!(points_in(journal), kept + A_RUN as usize);
+        let over = self.client.resume(&anna(), &left.id).unwrap_err();
+        assert_eq!(over.code, Code::RunState, "{over}");
+    }
+
+    /// The machine may be used again.
+    fn reset_and_zero(&self) {
+        if self.client.machine().state == MachineState::ErrorStop {
+            self.client.reset(&anna()).unwrap();
+            self.client.zero(&anna(), None);
+        }
     }
 
     /// Waits until it is paused.
@@ -99,6 +137,83 @@ fn a_run_that_is_paused_leaves_its_axis_free_and_goes_on_with_what_it_measured()
         assert_eq!(over.code, Code::RunState, "{over}");
         let over = bed.client.pause(&anna(), &id).unwrap_err();
         assert_eq!(over.code, Code::RunState, "{over}");
+    });
+}
+
+#[test]
+fn a_run_that_somebody_stopped_goes_on_with_what_it_measured() {
+    for mode in [StopMode::Controlled, StopMode::Quick] {
+        let new = |rig, folder: &std::path::Path| Stage::new(rig, (LINEAR, SEED), folder, short);
+        let body = |bed: &Bed<'_>| {
+            let id = bed.calibrating(A_RUN + 2);
+            bed.client.stop(&bert(), mode).unwrap();
+            let (left, kept) = bed.has_left(&id, RunState::Stopped);
+            assert_eq!(left.stopped.as_ref().unwrap().by, "bert");
+            bed.goes_on(&left, kept);
+        };
+        each_here(new, zeroed(body));
+    }
+}
+
+#[test]
+fn a_run_that_failed_keeps_its_cause_until_it_goes_on() {
+    let new = |rig, folder: &std::path::Path| Stage::new(rig, (LINEAR, SEED), folder, short);
+    let body = |bed: &Bed<'_>| {
+        let id = bed.calibrating(A_RUN + 2);
+        let fault = bed.stage.inject(Fault::BeamBlocked);
+        let (left, kept) = bed.has_left(&id, RunState::Failed);
+        bed.stage.end_fault(fault);
+        bed.reset_and_zero();
+        let still = bed.run_now(&id);
+        assert_eq!(still.cause.as_ref().unwrap().code, Code::Beam);
+        assert_eq!(still, left);
+        bed.goes_on(&left, kept);
+    };
+    each_here(new, zeroed(body));
+}
+
+#[test]
+fn a_run_that_timed_out_goes_on_once_its_axis_may_move_again() {
+    let hurried = |text| fewer(lenient(text));
+    let new = |rig, folder: &std::path::Path| Stage::new(rig, (LINEAR, SEED), folder, hurried);
+    let body = |bed: &Bed<'_>| {
+        let id = bed.calibrating(A_RUN + 2);
+        let fault = bed.stage.inject(Fault::BlockedAxis { axis: 0 });
+        let (left, kept) = bed.has_left(&id, RunState::TimedOut);
+        bed.stage.end_fault(fault);
+        let refused = bed.client.resume(&anna(), &id).unwrap_err();
+        assert_eq!(refused.code, Code::ErrorStop, "{refused}");
+        bed.reset_and_zero();
+        assert_eq!(bed.run_now(&id), left, "it was refused, and not begun");
+        bed.goes_on(&left, kept);
+    };
+    each_here(new, zeroed(body));
+}
+
+#[test]
+fn what_has_left_nothing_does_not_go_on_and_says_so() {
+    with_short_runs(|bed| {
+        let id = bed
+            .client
+            .plan(&anna(), &RunRequest::of(RunKind::Zero, None));
+        let id = id.unwrap();
+        bed.let_time_pass(0.2);
+        bed.client.stop(&bert(), StopMode::Controlled).unwrap();
+        let zero = bed.client.run(&id, PATIENCE).unwrap();
+        assert_eq!((zero.state, zero.can_resume), (RunState::Stopped, false));
+        bed.client.zero(&anna(), None);
+        let planned = RunRequest {
+            start: false,
+            ..RunRequest::of(RunKind::Calibrate, None)
+        };
+        let planned = bed.client.plan(&anna(), &planned).unwrap();
+        assert!(bed.run_now(&planned).can_resume, "it can be paused");
+        bed.client.abort(&bert(), &planned).unwrap();
+        assert!(!bed.run_now(&planned).can_resume, "it was never begun");
+        for id in [id, planned] {
+            let refused = bed.client.resume(&anna(), &id).unwrap_err();
+            assert_eq!(refused.code, Code::RunState, "{refused}");
+        }
     });
 }
 

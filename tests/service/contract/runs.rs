@@ -19,8 +19,12 @@ use crate::stage::Stage;
 
 /// Fewer measurements: how good they are is asked elsewhere.
 pub(super) fn short(text: String) -> String {
-    patient(text)
-        .edit("runs = 3", "runs = 2")
+    fewer(patient(text))
+}
+
+/// The same of any stage.
+pub(super) fn fewer(text: String) -> String {
+    text.edit("runs = 3", "runs = 2")
         .edit("step_mm = 3.0", "step_mm = 10.0")
         .edit("targets = 8\nruns = 5", "targets = 4\nruns = 2")
 }
@@ -158,7 +162,7 @@ fn a_beam_that_is_lost_fails_the_run_with_its_cause_and_nothing_is_stored() {
 }
 
 /// A drive that lets its axis be held fast: what it cannot do is seen by its time only.
-fn lenient(text: String) -> String {
+pub(super) fn lenient(text: String) -> String {
     text.edit(
         "following_error_limit_um = 500.0",
         "following_error_limit_um = 100000.0",

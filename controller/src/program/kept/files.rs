@@ -36,7 +36,6 @@ impl Service {
         // Journals are known by their names there.
         let name = journal.as_deref().and_then(Path::file_stem);
         request["resume"] = json!(name.map(|it| it.to_string_lossy()));
-        self.give_up_paused(&request)?;
         let stop = stop_request()?;
         let run = self.run(stage, request, None, Waiting::of_nobody(&stop, output))?;
         told_of(&run, output)

@@ -6,9 +6,8 @@ use machine::Stage;
 use serde_json::{Value, json};
 
 use super::{Service, VOLUME, Waiting, refuse, stop_request, tell};
-use crate::Failure;
 use crate::program::MachineArgs;
-use crate::program::exchange::{ask, plain};
+use crate::program::exchange::plain;
 use crate::program::linear::job::{GO_ON_ASKED, noted};
 use crate::program::output::{Ended, Output};
 
@@ -34,7 +33,6 @@ impl Service {
         refuse(args.record.is_some(), "--record")?;
         let stop = stop_request()?;
         self.zero_first(Some(axis), &stop, output)?;
-        self.give_up_paused(&request)?;
         request["kind"] = json!("job");
         let waiting = Waiting {
             by,
@@ -43,23 +41,6 @@ impl Service {
         };
         let run = self.run(Stage::Job, request, None, waiting)?;
         tell(&run, output)
-    }
-
-    /// What is gone on with anew is not gone on with twice.
-    pub(super) fn give_up_paused(&self, request: &Value) -> Result<(), Failure> {
-        let Some(journal) = request["resume"].as_str() else {
-            return Ok(());
-        };
-        let runs = ask(&self.at, "GET", "/v1/runs", "")?;
-        for run in runs.as_array().into_iter().flatten() {
-            let left = run["journal"].as_str().map(Path::new);
-            let is_meant = left.is_some_and(|it| it.file_stem() == Some(journal.as_ref()));
-            if is_meant && run["state"] == "paused" {
-                let id = plain(run["id"].as_str().unwrap_or_default());
-                ask(&self.at, "POST", &format!("/v1/runs/{id}/abort"), "{}")?;
-            }
-        }
-        Ok(())
     }
 
     /// Follows the path that `request` has.

@@ -291,19 +291,21 @@ function asking(run) {
   return shown;
 }
 
-// A run only ever goes on: what was asked for before an event came may arrive after it. What is older than a state:
+// What was asked for before an event came may arrive after it: a run that was begun less often then, or, of those that were
+// begun as often, what is older than a state:
 const UNDER_WAY = ["planned", "running", "stopping", "paused"];
-const OLDER = { planned: [], running: ["planned"], stopping: ["planned", "running"], paused: ["planned", "stopping"],
+const OLDER = { planned: [], running: ["planned"], stopping: ["planned", "running"], paused: ["planned", "running", "stopping"],
   done: UNDER_WAY, stopped: UNDER_WAY, failed: UNDER_WAY, timed_out: UNDER_WAY };
 
 function showRun(run) {
   const known = plans.get(run.id);
-  if (known && OLDER[known.state].includes(run.state)) return;
+  const before = known ? run.begun - known.begun : 1;
+  if (before < 0 || (before === 0 && OLDER[known.state].includes(run.state))) return;
   plans.set(run.id, run);
   // What is typed for a question stays while the question does.
-  const before = byId(`run-${run.id}`);
-  const asked = before && before.querySelector(".question");
-  const shown = before || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
+  const there = byId(`run-${run.id}`);
+  const asked = there && there.querySelector(".question");
+  const shown = there || byId("runs").insertBefore(document.createElement("article"), byId("runs").firstChild);
   shown.id = `run-${run.id}`;
   const { points, travel, seconds_at_least: seconds, asks } = run.plan;
   const parts = [element("h3", `${run.kind} ${run.of || run.axes.join(", ")} · ${run.id}`), element("p", run.state, run.state)];
@@ -348,7 +350,8 @@ function showRun(run) {
   const doing = document.createElement("p");
   if (run.state === "planned") doing.append(button("Start", () => ask("POST", `/v1/runs/${run.id}/start`)));
   if (run.state === "running" && run.can_resume) doing.append(button("Pause", () => ask("POST", `/v1/runs/${run.id}/pause`)));
-  if (run.state === "paused") doing.append(button("Resume", () => ask("POST", `/v1/runs/${run.id}/resume`)));
+  const ended = ["paused", "stopped", "failed", "timed_out"].includes(run.state);
+  if (ended && run.can_resume) doing.append(button("Resume", () => ask("POST", `/v1/runs/${run.id}/resume`)));
   if (["planned", "running", "paused"].includes(run.state)) doing.append(button("Abort", () => ask("POST", `/v1/runs/${run.id}/abort`)));
   shown.replaceChildren(...parts, doing);
   redraw(shown);

@@ -163,12 +163,13 @@ pub(super) async fn pause(
     Ok(Json(state.desk.run(&id)?))
 }
 
-/// A paused run goes on with what it measured; so does one that an earlier service or program left.
+/// A run that was paused or stopped, has failed or timed out goes on with what its journal has (`can_resume`); so does one
+/// that an earlier service or program left.
 #[utoipa::path(
     post, path = "/runs/{id}/resume", tag = "runs", params(Asks, ("id" = String, Path, description = "Its name")),
     responses(
         (status = 200, description = "It goes on", body = RunView),
-        (status = "4XX", description = "It is not paused, or its axis is in use or has no zero", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "4XX", description = "It cannot go on, or its axis is in use or has no zero", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
     )
 )]

@@ -115,6 +115,48 @@ impl Run {
         self
     }
 
+    /// Whether it can be paused; of one that has ended, whether it can go on with what its journal has.
+    pub(super) fn can_go_on(&self) -> bool {
+        match self.view.state {
+            RunState::Planned | RunState::Running | RunState::Stopping | RunState::Paused => {
+                self.task.is_resumed
+            }
+            RunState::Done => false,
+            RunState::Stopped | RunState::Failed | RunState::TimedOut => {
+                self.task.is_resumed && self.has_left()
+            }
+        }
+    }
+
+    /// Whether it has left a journal that nobody else goes on with, and has no result.
+    fn has_left(&self) -> bool {
+        // What was measured elsewhere is in its request, which is not kept.
+        let has_all = self.view.kind != RunKind::Job || self.task.judged.is_some();
+        self.view.journal.is_some()
+            && self.view.result.is_null()
+            && has_all
+            && !self.task.has_files()
+    }
+
+    /// Whether it keeps what it goes along.
+    const fn holds(&self) -> bool {
+        self.task.judged.is_some()
+    }
+
+    /// What it goes along is kept as long as it may be gone on with.
+    pub(super) fn let_go(&mut self) {
+        self.view.can_resume = self.can_go_on();
+        if self.view.state.is_end() && !self.view.can_resume {
+            self.task.judged = None;
+        }
+    }
+
+    /// Another run goes on with its journal: nobody goes on with it twice.
+    fn give_up(&mut self) {
+        self.task.is_resumed = false;
+        self.let_go();
+    }
+
     /// Whether its procedure is to end before it is complete.
     const fn is_to_end(&self) -> bool {
         self.stopped.is_some() || self.is_pausing
@@ -154,14 +196,37 @@ impl Runs {
         self.published = None;
     }
 
-    /// Paths are long, and wait in memory until they are followed; so do jobs and files.
-    pub(super) fn require_room_for(&self, judged: Option<&Judged>) -> Result<(), Problem> {
-        let waiting = self.kept.iter().filter(|it| it.task.judged.is_some());
+    /// Paths are long, and wait in memory until they are followed; so do jobs and files. Jobs that have ended, and could go
+    /// on, make room.
+    pub(super) fn make_room_for(&mut self, judged: Option<&Judged>) -> Result<(), Problem> {
+        let waiting = self.kept.iter().filter(|it| it.holds());
         if judged.is_none() || waiting.count() < PATHS {
+            return Ok(());
+        }
+        let mut kept = self.kept.iter_mut();
+        if let Some(ended) = kept.find(|it| it.holds() && it.view.state.is_end()) {
+            ended.changing().give_up();
+            self.published = None;
             return Ok(());
         }
         let what = format!("{PATHS} paths, jobs and files are planned or under way");
         Err(Problem::new(Code::Busy, what, "start them, or abort one"))
+    }
+
+    /// The run `id` goes on with `journal`: the others that have left it do not. Those that were paused for that.
+    pub(super) fn give_up_others(&mut self, id: &str, journal: &str) -> Vec<String> {
+        let is_other = |it: &&mut Run| {
+            *it.task.id != *id && it.view.journal.as_deref() == Some(journal) && it.can_go_on()
+        };
+        let mut paused = Vec::new();
+        for run in self.kept.iter_mut().filter(is_other) {
+            run.changing().give_up();
+            if run.view.state == RunState::Paused {
+                paused.push(run.view.id.clone());
+            }
+        }
+        self.published = None;
+        paused
     }
 
     pub(in crate::keeper) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {

@@ -1,4 +1,5 @@
-//! Runs that are paused, and those that an earlier service left: they go on with what was measured.
+//! Runs that are paused or have ended before their result, and those that an earlier service left: they go on with what was
+//! measured.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -50,11 +51,21 @@ impl Keeper {
         machine: &Machine,
         id: &str,
     ) -> Result<(), Problem> {
-        if self.runs.find(id)?.view.state != RunState::Paused {
-            let what = format!("run {id} is not paused");
-            return Err(Problem::new(Code::RunState, what, "plan another one"));
-        }
-        self.begin(machine, id)
+        let run = self.runs.find(id)?;
+        let has_ended = run.view.state.is_end();
+        let why = match run.view.state {
+            RunState::Planned => "was not begun yet",
+            RunState::Running | RunState::Stopping => "is under way",
+            RunState::Done => "has its result",
+            _ if run.can_go_on() => return self.begin(machine, id),
+            _ => "has left nothing that it could go on with",
+        };
+        let what = format!("run {id} {why}");
+        let help = match has_ended {
+            true => "plan another one",
+            false => "look what it does",
+        };
+        Err(Problem::new(Code::RunState, what, help))
     }
 
     /// The procedure of the run `id` has ended early; what it measured is in `journal`.
@@ -106,6 +117,6 @@ impl Keeper {
     }
 }
 
-fn text(path: &Path) -> String {
+pub(super) fn text(path: &Path) -> String {
     path.display().to_string()
 }
