@@ -28,6 +28,7 @@ use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
 use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
 pub(crate) use along::Judges;
+pub(crate) use runs::Prepared;
 
 /// How often whoever waits looks.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
@@ -147,9 +148,9 @@ impl Desk {
     }
 }
 
-/// What a request for a motion comes to before the machine is asked.
+/// What a request for a motion or a run comes to before it is judged.
 pub(crate) enum Noted {
-    /// It was made before: the motion that it became.
+    /// It was made before: what it became.
     Before(String),
     /// It is on the disk under this name, and may be ordered.
     New(String),
@@ -192,14 +193,10 @@ impl Desk {
             if before.request == *request {
                 return Ok(Noted::Before(before.id.clone()));
             }
-            return Err(Problem::new(
-                Code::KeyReused,
-                format!(
-                    "this Idempotency-Key was used for motion {}, which is another one",
-                    before.id
-                ),
-                "give each request a key of its own",
-            ));
+            return Err(key_reused(&format!("motion {}", before.id)));
+        }
+        if let Some(run) = key.and_then(|key| ledger.run_of_key(key)) {
+            return Err(key_reused(&format!("run {}", run.id)));
         }
         let id = ledger.next_id('m');
         let asked = Asked {
@@ -213,7 +210,7 @@ impl Desk {
         Ok(Noted::New(id))
     }
 
-    /// What became of the order of a motion.
+    /// What became of the order of a motion, or of a run with a key.
     pub(crate) fn settle_motion(
         &self,
         id: String,
@@ -301,7 +298,7 @@ impl Desk {
         self.done(caller, Order::Renew { motion })
     }
 
-    /// Writes down how motions ended, for after a restart. Whoever serves calls it now and then.
+    /// Writes down how motions, and runs with a key, ended, for after a restart. Whoever serves calls it now and then.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -311,6 +308,10 @@ impl Desk {
         let ended = snapshot.motions.iter().filter(|it| it.state.is_end());
         for view in ended {
             ledger.end(view).map_err(|it| storage(&it))?;
+        }
+        let ended = snapshot.runs.iter().filter(|it| it.state.is_end());
+        for view in ended {
+            ledger.end_run(view).map_err(|it| storage(&it))?;
         }
         Ok(())
     }
@@ -337,6 +338,12 @@ fn unended(asked: &Asked, is_of_earlier_boot: bool) -> MotionView {
         axes: std::collections::BTreeMap::new(),
         told: None,
     }
+}
+
+/// That an Idempotency-Key is that of `other`.
+fn key_reused(other: &str) -> Problem {
+    let what = format!("this Idempotency-Key was used for {other}, which is another one");
+    Problem::new(Code::KeyReused, what, "give each request a key of its own")
 }
 
 fn storage(error: &LedgerError) -> Problem {

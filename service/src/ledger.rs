@@ -1,7 +1,9 @@
-//! Which request is which motion, in a file: the same request never moves twice, not even after a restart.
+//! Which request is which motion or run, in a file: the same request never moves twice, not even after a restart.
 //!
 //! One JSON object a line. A line is written and synced before its order is given to the machine's thread; a
 //! last line that a crash cut off is left out when the file is read, for its order was never given.
+
+mod runs;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::{self, File, OpenOptions};
@@ -11,9 +13,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::request::MoveRequest;
-use crate::view::MotionView;
+use crate::view::{MotionView, RunView};
+pub(crate) use runs::AskedRun;
+use runs::KnownRuns;
 
-/// So many motions are remembered over a restart.
+/// So many motions, and so many runs that were asked for with a key, are remembered over a restart.
 const KEPT: usize = 4096;
 
 /// The ledger cannot be read or written.
@@ -34,10 +38,14 @@ enum Line {
     Boot(u64),
     /// A motion was asked for.
     Asked(Asked),
-    /// It was refused: nothing moved.
+    /// A motion or run was refused: nothing moved.
     Refused(String),
     /// It ended.
     Ended(Box<MotionView>),
+    /// A run was asked for with a key.
+    AskedRun(AskedRun),
+    /// It ended; once more where it went on.
+    EndedRun(Box<RunView>),
 }
 
 /// A motion that was asked for.
@@ -51,7 +59,7 @@ pub(crate) struct Asked {
     pub(crate) request: MoveRequest,
 }
 
-/// The motions that were asked for.
+/// The motions and runs that were asked for.
 #[derive(Debug)]
 pub(crate) struct Ledger {
     path: PathBuf,
@@ -60,6 +68,7 @@ pub(crate) struct Ledger {
     motions: u64,
     asked: VecDeque<Asked>,
     ended: BTreeMap<String, MotionView>,
+    runs: KnownRuns,
 }
 
 impl Ledger {
@@ -95,6 +104,7 @@ impl Ledger {
             motions: 0,
             asked: before.asked,
             ended: before.ended,
+            runs: before.runs,
         })
     }
 
@@ -129,8 +139,38 @@ impl Ledger {
 
     /// Whether `asked` was asked for before the last restart.
     pub(crate) fn is_of_earlier_boot(&self, asked: &Asked) -> bool {
-        let own = format!("m{}-", self.boot);
-        !asked.id.starts_with(&own)
+        !self.is_own(&asked.id)
+    }
+
+    /// Whether this service gave the name `id`.
+    fn is_own(&self, id: &str) -> bool {
+        let own = format!("{}-", self.boot);
+        id.get(1..).is_some_and(|it| it.starts_with(&own))
+    }
+
+    /// The run that was asked for with `key`.
+    pub(crate) fn run_of_key(&self, key: &str) -> Option<&AskedRun> {
+        self.runs.of_key(key)
+    }
+
+    /// The run `id` that was asked for with a key, as far as it is known.
+    pub(crate) fn run(&self, id: &str) -> Option<RunView> {
+        self.runs.run(id, !self.is_own(id))
+    }
+
+    /// Notes a run that will be asked for; it is on the disk when this returns.
+    pub(crate) fn ask_run(&mut self, asked: AskedRun) -> Result<(), LedgerError> {
+        self.append(&Line::AskedRun(asked.clone()), true)?;
+        self.runs.ask(asked);
+        Ok(())
+    }
+
+    /// Notes how a run ended that was asked for with a key.
+    pub(crate) fn end_run(&mut self, view: &RunView) -> Result<(), LedgerError> {
+        match self.runs.end(view) {
+            Some(ended) => self.append(&Line::EndedRun(Box::new(ended)), false),
+            None => Ok(()),
+        }
     }
 
     /// Notes a motion that will be asked for; with a key, it is on the disk when this returns.
@@ -147,9 +187,10 @@ impl Ledger {
         Ok(())
     }
 
-    /// The motion `id` was refused: its key is free again.
+    /// The motion or run `id` was refused: its key is free again.
     pub(crate) fn refuse(&mut self, id: &str) -> Result<(), LedgerError> {
         self.asked.retain(|it| it.id != id);
+        self.runs.forget(id);
         self.append(&Line::Refused(id.to_owned()), false)
     }
 
@@ -185,6 +226,7 @@ struct Before {
     boot: u64,
     asked: VecDeque<Asked>,
     ended: BTreeMap<String, MotionView>,
+    runs: KnownRuns,
 }
 
 impl Before {
@@ -192,7 +234,12 @@ impl Before {
         match line {
             Line::Boot(boot) => self.boot = self.boot.max(boot),
             Line::Asked(asked) => self.asked.push_back(asked),
-            Line::Refused(id) => self.asked.retain(|it| it.id != id),
+            Line::Refused(id) => {
+                self.asked.retain(|it| it.id != id);
+                self.runs.forget(&id);
+            }
+            Line::AskedRun(asked) => self.runs.ask(asked),
+            Line::EndedRun(view) => self.runs.take_end(*view),
             Line::Ended(view) => {
                 self.ended.insert(view.id.clone(), *view);
             }
@@ -209,7 +256,12 @@ impl Before {
         let asked = self.asked.iter().cloned().map(Line::Asked);
         let ended = self.ended.values().cloned();
         let ended = ended.map(|it| Line::Ended(Box::new(it)));
+        let runs = self.runs.all().flat_map(|(asked, ended)| {
+            let ended = ended.map(|it| Line::EndedRun(Box::new(it)));
+            [Line::AskedRun(asked)].into_iter().chain(ended)
+        });
         let lines = [Line::Boot(boot)].into_iter().chain(asked).chain(ended);
+        let lines = lines.chain(runs);
         lines
             .filter_map(|line| serde_json::to_string(&line).ok())
             .flat_map(|line| format!("{line}\n").into_bytes())

@@ -30,7 +30,15 @@ pub(crate) trait Client {
     fn stop(&self, who: &Caller, mode: StopMode) -> Result<(), Problem>;
     fn reset(&self, who: &Caller) -> Result<(), Problem>;
     fn power(&self, who: &Caller, axis: &str, on: bool) -> Result<(), Problem>;
-    fn plan(&self, who: &Caller, request: &RunRequest) -> Result<String, Problem>;
+    fn plan(&self, who: &Caller, request: &RunRequest) -> Result<String, Problem> {
+        self.plan_once(who, request, None)
+    }
+    fn plan_once(
+        &self,
+        who: &Caller,
+        request: &RunRequest,
+        key: Option<&str>,
+    ) -> Result<String, Problem>;
     fn start(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn abort(&self, who: &Caller, id: &str) -> Result<(), Problem>;
     fn pause(&self, who: &Caller, id: &str) -> Result<(), Problem>;
@@ -120,9 +128,14 @@ impl Client for InProcess {
         }
     }
 
-    fn plan(&self, who: &Caller, request: &RunRequest) -> Result<String, Problem> {
+    fn plan_once(
+        &self,
+        who: &Caller,
+        request: &RunRequest,
+        key: Option<&str>,
+    ) -> Result<String, Problem> {
         let _passing = self.gate.pass();
-        self.desk.plan_run(who, request)
+        self.desk.plan_run(who, request, key)
     }
 
     fn start(&self, who: &Caller, id: &str) -> Result<(), Problem> {

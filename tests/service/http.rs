@@ -164,6 +164,10 @@ impl Http {
     }
 }
 
+fn key_header(key: Option<&str>) -> String {
+    key.map_or(String::new(), |it| format!("\r\nidempotency-key: {it}"))
+}
+
 fn unchunked(mut bytes: &[u8]) -> Vec<u8> {
     let mut whole = Vec::new();
     while let Some(end) = bytes.windows(2).position(|it| it == b"\r\n") {
@@ -187,8 +191,7 @@ impl Client for Http {
         request: &MoveRequest,
         key: Option<&str>,
     ) -> Result<String, Problem> {
-        let key = key.map_or(String::new(), |it| format!("\r\nidempotency-key: {it}"));
-        let answer = self.post(who, "/v1/motions", &key, &json!(request));
+        let answer = self.post(who, "/v1/motions", &key_header(key), &json!(request));
         Ok(answer.read::<MotionView>()?.id)
     }
 
@@ -222,8 +225,13 @@ impl Client for Http {
         answer.read::<AxisView>().map(|_| ())
     }
 
-    fn plan(&self, who: &Caller, request: &RunRequest) -> Result<String, Problem> {
-        let answer = self.post(who, "/v1/runs", "", &json!(request));
+    fn plan_once(
+        &self,
+        who: &Caller,
+        request: &RunRequest,
+        key: Option<&str>,
+    ) -> Result<String, Problem> {
+        let answer = self.post(who, "/v1/runs", &key_header(key), &json!(request));
         Ok(answer.read::<RunView>()?.id)
     }
 

@@ -41,6 +41,17 @@ fn what_the_description_excludes_is_refused_as_a_problem() {
                 400,
             ),
             (&*spaced, r#"{"targets": {"x": "1mm"}}"#, 400),
+            (
+                "POST /v1/runs HTTP/1.1\r\nidempotency-key: a b",
+                r#"{"kind": "zero"}"#,
+                400,
+            ),
+            // A dead-man is renewed by the same request again and again.
+            (
+                "POST /v1/jog HTTP/1.1\r\nidempotency-key: a",
+                r#"{"axis": "x", "speed": "1mm/s"}"#,
+                400,
+            ),
             (LEASE, &*long, 400),
             (LEASE, r#"{"name": ""}"#, 400),
             (LEASE, r#"{"name": "anna", "seconds": 0}"#, 400),

@@ -37,6 +37,9 @@ pub(super) const NAME_MAX: usize = 64;
 const HELP: &str = "GET /openapi.json says what is expected";
 /// Who a client says that it is, for people.
 const CLIENT: &str = "truestage-client";
+/// By which a request is known when it comes again, and how long that may be.
+const KEY: &str = "idempotency-key";
+const KEY_MAX: usize = 256;
 /// What proves the lease.
 const LEASE: &str = "truestage-lease";
 
@@ -254,6 +257,35 @@ impl<S: Send + Sync> FromRequestParts<S> for Named {
 pub(super) fn plain(text: &str) -> String {
     let is_plain = |it: &char| it.is_alphanumeric() || " .-_@:/".contains(*it);
     text.chars().filter(is_plain).take(NAME_MAX).collect()
+}
+
+/// Whether a request has an Idempotency-Key.
+pub(super) fn has_key(headers: &HeaderMap) -> bool {
+    headers.contains_key(KEY)
+}
+
+/// The Idempotency-Key of a request, when it has one.
+///
+/// # Errors
+/// When that is none.
+pub(super) fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let Some(key) = headers.get(KEY) else {
+        return Ok(None);
+    };
+    match key.to_str() {
+        Ok(key) if (1..=KEY_MAX).contains(&key.len()) && is_visible(key) => {
+            Ok(Some(key.to_owned()))
+        }
+        _ => Err(Problem::new(
+            Code::BadRequest,
+            format!("an Idempotency-Key has 1 to {KEY_MAX} visible characters of ASCII"),
+            "a random number is a good one",
+        )),
+    }
+}
+
+fn is_visible(key: &str) -> bool {
+    key.bytes().all(|it| it.is_ascii_graphic())
 }
 
 /// A body in JSON.

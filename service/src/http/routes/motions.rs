@@ -5,7 +5,7 @@ use axum::extract::State as Of;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::super::guard::{Asks, Body, By, Named};
+use super::super::guard::{Asks, Body, By, Named, has_key, key_of};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
 use crate::desk::{Noted, named};
@@ -13,9 +13,6 @@ use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
 use crate::request::{JogRequest, MoveRequest};
 use crate::view::MotionView;
-
-/// So long an Idempotency-Key may be.
-const KEY_MAX: usize = 256;
 
 /// The motions under way, and the last that ended.
 #[utoipa::path(
@@ -68,26 +65,6 @@ pub(super) async fn begin(
     Ok((status, location, Json(view)))
 }
 
-fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
-    let Some(key) = headers.get("idempotency-key") else {
-        return Ok(None);
-    };
-    match key.to_str() {
-        Ok(key) if (1..=KEY_MAX).contains(&key.len()) && is_visible(key) => {
-            Ok(Some(key.to_owned()))
-        }
-        _ => Err(Problem::new(
-            Code::BadRequest,
-            format!("an Idempotency-Key has 1 to {KEY_MAX} visible characters of ASCII"),
-            "a random number is a good one",
-        )),
-    }
-}
-
-fn is_visible(key: &str) -> bool {
-    key.bytes().all(|it| it.is_ascii_graphic())
-}
-
 /// A motion, once it has ended or the time to wait is over.
 #[utoipa::path(
     get, path = "/motions/{id}", tag = "motions", params(("id" = String, Path, description = "Its name"), Wait),
@@ -118,8 +95,13 @@ pub(super) async fn motion(
 pub(super) async fn jog(
     Of(state): Of<State>,
     By(caller): By,
+    headers: HeaderMap,
     Body(request): Body<JogRequest>,
 ) -> Result<Json<MotionView>, Problem> {
+    if has_key(&headers) {
+        let what = "a jog has no Idempotency-Key: the same request again renews it";
+        return Err(Problem::new(Code::BadRequest, what, "leave it out"));
+    }
     let order = state.desk.jog_order(&request);
     let id = named(obey(&state.desk, &caller, order).await?)?;
     Ok(Json(state.desk.motion(&id)?))

@@ -2,17 +2,17 @@
 
 use axum::Json;
 use axum::extract::State as Of;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::super::guard::{Asks, Body, By, Named};
+use super::super::guard::{Asks, Body, By, Named, key_of};
 use super::super::identity::Admitted;
 use super::super::needs::{enough, of_run};
 use super::super::state::State;
 use super::{MaybeQuery, Wait, obey, query};
-use crate::desk::Desk;
+use crate::desk::Prepared;
 use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
 use crate::request::{AnswerRequest, RunRequest};
@@ -27,11 +27,14 @@ pub(super) async fn runs(Of(state): Of<State>) -> Json<Vec<RunView>> {
     Json(state.desk.runs())
 }
 
-/// Plans a run, and starts it when `start` says so.
+/// Plans a run, and starts it when `start` says so. With an Idempotency-Key the same request never makes two runs, not even
+/// after a restart.
 #[utoipa::path(
-    post, path = "/runs", tag = "runs", request_body = RunRequest, params(Asks),
+    post, path = "/runs", tag = "runs", request_body = RunRequest,
+    params(Asks, ("Idempotency-Key" = Option<String>, Header, description = "A key of the client's own for this run: visible ASCII", min_length = 1, max_length = 256, pattern = "^[!-~]*$")),
     responses(
         (status = 201, description = "Planned, or started", body = RunView, headers(("Location" = String, description = "Where it is asked for"))),
+        (status = 200, description = "It was asked for before, with this key", body = RunView),
         (status = "4XX", description = "Refused; nothing was moved", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
     )
@@ -40,21 +43,28 @@ pub(super) async fn plan(
     Of(state): Of<State>,
     By(caller): By,
     admitted: Admitted,
+    headers: HeaderMap,
     Body(request): Body<RunRequest>,
 ) -> Result<impl IntoResponse, Problem> {
     enough(admitted.role, of_run(request.kind))?;
-    let id = state.desk.next_run();
-    let judging = {
-        let (desk, request) = (state.desk.clone(), request.clone());
-        // Long paths take seconds: others are served meanwhile.
-        tokio::task::spawn_blocking(move || desk.judge_run(&request))
+    let key = key_of(&headers)?;
+    let preparing = {
+        let (desk, caller, key) = (state.desk.clone(), caller.clone(), key.clone());
+        // Long paths take seconds, and disks their time: others are served meanwhile.
+        tokio::task::spawn_blocking(move || desk.prepare_run(&caller, &request, key.as_deref()))
     };
-    let judged = judging.await;
-    let judged = judged.map_err(|it| Problem::new(Code::Busy, it.to_string(), ""))??;
-    let order = Desk::plan_order(&id, &request, judged);
-    obey(&state.desk, &caller, order).await?;
+    let prepared = preparing.await;
+    let prepared = prepared.map_err(|it| Problem::new(Code::Busy, it.to_string(), ""))??;
+    let (status, id) = match prepared {
+        Prepared::Before(id) => (StatusCode::OK, id),
+        Prepared::New(id, order) => {
+            let planned = obey(&state.desk, &caller, order).await.map(|_| ());
+            let id = state.desk.settle_run(id, key.as_deref(), planned)?;
+            (StatusCode::CREATED, id)
+        }
+    };
     let location = [(header::LOCATION, format!("/v1/runs/{id}"))];
-    Ok((StatusCode::CREATED, location, Json(state.desk.run(&id)?)))
+    Ok((status, location, Json(state.desk.run(&id)?)))
 }
 
 /// How long an answer may be held back, and what of it is known.
