@@ -159,6 +159,16 @@ pub enum StopMode {
     Quick,
 }
 
+impl StopMode {
+    /// As it is written.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Controlled => "controlled",
+            Self::Quick => "quick",
+        }
+    }
+}
+
 /// What is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

@@ -7,10 +7,10 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use service::{Access, Caller, Edge, Listen};
+use service::{Access, Caller, Edge, Listen, RunKind, RunRequest, RunState};
 use tests::LINEAR;
 
-use crate::client::Client;
+use crate::client::{Client, PATIENCE};
 use crate::http::Http;
 use crate::stage::Stage;
 
@@ -94,6 +94,71 @@ fn whatever_is_sent_is_answered_with_a_problem() {
             assert_eq!(problem["status"], status, "{head}: {problem}");
             assert!(!answer.body.contains(&0x1b), "{head}: {problem}");
         }
+    });
+}
+
+/// A key that is written wrongly must not keep a machine going.
+#[test]
+fn a_stop_stops_whatever_its_body_says_and_tells_what_was_not_understood() {
+    on_a_stage(|_, http| {
+        let who = Caller::named("anna");
+        http.zero(&who, None);
+        let large = vec![b'x'; 70_000];
+        let cases: [&[u8]; 7] = [
+            br#"{"mode": "QUICK"}"#,
+            br#"{"mode": null}"#,
+            br#"{"now": true}"#,
+            b"[]",
+            b"\xff\x00 not JSON",
+            b"{",
+            &large,
+        ];
+        for body in cases {
+            let run = RunRequest::of(RunKind::Zero, None);
+            let id = http.plan(&who, &run).unwrap();
+            let answer = http.ask("POST /v1/stop HTTP/1.1", body);
+            let said = answer.json();
+            assert_eq!(
+                (answer.status, &said["done"]),
+                (200, &json!(true)),
+                "{said}"
+            );
+            let warning = said["warning"].as_str().expect("it was not understood");
+            assert!(warning.contains("stopped (controlled)"), "{warning}");
+            let run = http.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+        }
+        let plain = http.ask("POST /v1/stop HTTP/1.1", br#"{"mode": "controlled"}"#);
+        assert_eq!(plain.json(), json!({"done": true}));
+        // What is understood of it counts.
+        http.zero(&who, None);
+        let more = br#"{"mode": "quick", "more": 1}"#;
+        let said = http.ask("POST /v1/stop HTTP/1.1", more).json();
+        let warning = said["warning"].as_str().expect("there is more");
+        assert!(warning.contains("stopped (quick)"), "{warning}");
+    });
+}
+
+/// Whoever promises a body and sends none of it wants a stop all the same.
+#[test]
+fn a_stop_does_not_wait_for_a_body_that_does_not_come() {
+    on_a_stage(|stage, http| {
+        let id = http
+            .plan(&Caller::named("anna"), &RunRequest::of(RunKind::Zero, None))
+            .unwrap();
+        let mut stream = UnixStream::connect(http.socket()).unwrap();
+        let head =
+            "POST /v1/stop HTTP/1.1\r\nhost: x\r\ncontent-length: 20\r\nconnection: close\r\n\r\n{";
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut said = String::new();
+        {
+            let _passing = stage.gate.pass();
+            stream.read_to_string(&mut said).unwrap();
+        }
+        assert!(said.starts_with("HTTP/1.1 200 "), "{said}");
+        assert!(said.contains("had not come as a whole"), "{said}");
+        let run = http.run(&id, PATIENCE).unwrap();
+        assert_eq!(run.state, RunState::Stopped, "{run:?}");
     });
 }
 

@@ -16,7 +16,6 @@ fn what_the_description_excludes_is_refused_as_a_problem() {
         let long = format!(r#"{{"name": "{}"}}"#, "n".repeat(65));
         let spaced = format!("{MOTIONS}\r\nidempotency-key: a b");
         let cases = [
-            ("POST /v1/stop HTTP/1.1", "[]", 400),
             ("POST /v1/jog HTTP/1.1", r#"["x", "1mm/s"]"#, 400),
             ("POST /v1/jog HTTP/1.1", r#" ["x", "1mm/s"]"#, 400),
             (

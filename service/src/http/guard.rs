@@ -6,7 +6,7 @@ use axum::Json;
 use axum::body::{Bytes, HttpBody};
 use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
@@ -15,7 +15,7 @@ use tokio::time::timeout;
 use utoipa::IntoParams;
 
 use super::door::Peer;
-use super::identity::{Admitted, Identities};
+use super::identity::{Admitted, Identities, STOP};
 use super::needs::{enough, needed};
 use super::place::Listen;
 use super::places::Keeps;
@@ -31,6 +31,8 @@ const PATH_MAX: usize = 1 << 20;
 const HEARD_MAX: usize = 2 << 20;
 /// How long a body may take to come: its connection has one of the places meanwhile.
 const BODY_TIME: Duration = Duration::from_secs(10);
+/// How long a stop waits for its own.
+const STOP_TIME: Duration = Duration::from_secs(1);
 /// So long a name of a client may be.
 pub(super) const NAME_MAX: usize = 64;
 /// What whoever sent a wrong body is told.
@@ -124,11 +126,18 @@ pub(super) async fn guard(
         true => PATH_MAX,
         false => BODY_MAX,
     };
-    let whole = timeout(BODY_TIME, whole(body, most)).await;
-    let whole = whole.unwrap_or_else(|_| {
-        let what = format!("the request had not come as a whole after {BODY_TIME:?}");
+    let is_stop = parts.method == Method::POST && parts.uri.path() == STOP;
+    let limit = if is_stop { STOP_TIME } else { BODY_TIME };
+    let whole = timeout(limit, whole(body, most)).await;
+    let mut whole = whole.unwrap_or_else(|_| {
+        let what = format!("the request had not come as a whole after {limit:?}");
         Err(Problem::new(Code::BadRequest, what, "send it faster"))
     });
+    if is_stop && let Err(problem) = whole {
+        // It stops all the same, and says so.
+        parts.extensions.insert(Unheard(problem));
+        whole = Ok(Vec::new());
+    }
     match admitted.and_then(|it| Ok((it, whole?))) {
         Ok((admitted, body)) => {
             // An order is carried out whoever else comes; whoever only waits for something makes room.
@@ -140,6 +149,10 @@ pub(super) async fn guard(
         Err(problem) => problem.into_response(),
     }
 }
+
+/// Why what a stop says was not heard.
+#[derive(Clone, Debug)]
+pub(super) struct Unheard(pub(super) Problem);
 
 /// All of a body, also where nobody asks for it. One that says that it is far too large is not heard at all.
 async fn whole(body: axum::body::Body, most: usize) -> Result<Vec<u8>, Problem> {

@@ -25,7 +25,7 @@ const OF_STRANGERS: Rate = Rate {
 };
 
 /// What whoever was let in may always ask for.
-const STOP: &str = "/v1/stop";
+pub(super) const STOP: &str = "/v1/stop";
 
 /// Who was let in.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,6 +6,7 @@ mod machine;
 mod motions;
 mod runs;
 mod secured;
+mod stops;
 
 use core::time::Duration;
 

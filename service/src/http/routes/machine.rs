@@ -1,13 +1,15 @@
 //! The machine as a whole, and its axes.
 
-use axum::Json;
+use axum::body::Bytes;
 use axum::extract::State as Of;
-use serde::{Deserialize, Serialize};
+use axum::{Extension, Json};
+use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::super::guard::{Asks, Body, By, NAME_MAX, Named, plain};
+use super::super::guard::{Asks, Body, By, NAME_MAX, Named, Unheard, plain};
 use super::super::identity::Admitted;
 use super::super::state::State;
+use super::stops::{StopDone, StopRequest, understood};
 use super::{obey, obey_at_last};
 use crate::desk::Desk;
 use crate::order::{Answer, Order};
@@ -96,15 +98,6 @@ async fn power(
     Ok(Json(desk.axis(&axis)?))
 }
 
-/// How everything is stopped.
-#[derive(Debug, Default, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct StopRequest {
-    /// `controlled` when left out.
-    #[serde(default)]
-    mode: StopMode,
-}
-
 /// That it was done.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Done {
@@ -114,23 +107,32 @@ pub(super) struct Done {
 
 const DONE: Json<Done> = Json(Done { done: true });
 
-/// Stops everything. Taken from anybody, whoever has the lease.
+/// Stops everything. Taken from anybody, whoever has the lease, and whatever the body says: where the mode is not understood,
+/// axes slow down, and `warning` says why.
 #[utoipa::path(
     post, path = "/stop", tag = "machine", request_body(content = StopRequest, description = "May be left out"), params(Asks),
     responses(
-        (status = 200, description = "The stop is under way; motions and runs say when it has ended", body = Done),
-        (status = "4XX", description = "Not understood", body = ProblemBody, content_type = "application/problem+json"),
+        (status = 200, description = "The stop is under way; motions and runs say when it has ended", body = StopDone),
+        (status = "4XX", description = "Not let in", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "The service", body = ProblemBody, content_type = "application/problem+json"),
     )
 )]
 pub(super) async fn stop(
     Of(state): Of<State>,
     By(caller): By,
-    body: Result<Body<StopRequest>, Problem>,
-) -> Result<Json<Done>, Problem> {
-    let mode = body?.0.mode;
+    unheard: Option<Extension<Unheard>>,
+    said: Bytes,
+) -> Result<Json<StopDone>, Problem> {
+    let (mode, warning) = match unheard {
+        Some(Extension(Unheard(problem))) => (StopMode::default(), Some(problem.detail())),
+        None => understood(&said),
+    };
     obey_at_last(&state.desk, &caller, Order::Stop { mode }).await?;
-    Ok(DONE)
+    let warning = warning.map(|it| format!("stopped ({}), and not understood: {it}", mode.word()));
+    Ok(Json(StopDone {
+        done: true,
+        warning,
+    }))
 }
 
 /// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again.
