@@ -389,7 +389,7 @@ pub struct RunView {
     /// Calibrate: its verification shows that what was stored makes the machine worse.
     #[serde(default)]
     pub made_worse: bool,
-    /// Where one that ended before its result has what it measured, as far as it can go on with that.
+    /// Where what it measured is, once it has ended; of one without a result, as far as it can go on with that.
     #[serde(default)]
     pub journal: Option<String>,
 }

@@ -226,6 +226,19 @@ fn a_service_shows_the_journals_of_runs_and_their_pages() {
             page.starts_with("<!doctype html>") && page.contains("</svg>"),
             "{page}"
         );
+        // A file is called so, too, and a run of this service by its own name.
+        assert_eq!(get(&format!("reports/{name}.jsonl")), (200, page));
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        let (_, runs) = ask(folder, "GET /v1/runs", &json!({}));
+        let run = runs.as_array().and_then(|it| it.last()).expect("a zero");
+        assert_eq!(run["journal"], run["result"]["journal"], "{run}");
+        let id = run["id"].as_str().expect("a name");
+        let (status, journal) = get(&format!("journals/{id}"));
+        let stored = run["journal"].as_str().expect("where it is");
+        let stored = std::fs::read_to_string(bench.folder().join(stored));
+        assert_eq!((status, journal), (200, stored.expect("it is there")));
+        let (status, said) = get(&format!("reports/{id}"));
+        assert_eq!(status, 200, "{said}");
         let (_, axis) = ask(folder, "GET /v1/axes/x", &json!({}));
         assert!(axis["calibration_created"].is_string(), "{axis}");
         let (_, metrics) = fetch(folder, "GET /metrics", &json!({}));

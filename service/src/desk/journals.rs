@@ -1,6 +1,6 @@
 //! Journals of runs, and the pages that are made of them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use machine::records::{AnyLog, StoreError, read_journal};
 use truestage::Failure;
@@ -25,7 +25,7 @@ impl Desk {
         Ok(newest.map(|name| self.journal_view(name)).collect())
     }
 
-    /// What the journal `name` says: JSON Lines.
+    /// What the journal `name`, or that of the run with this name, says: JSON Lines.
     ///
     /// # Errors
     /// When there is none, or it cannot be read.
@@ -35,7 +35,7 @@ impl Desk {
         read.map_err(|source| Problem::from(Failure::File { path, source }))
     }
 
-    /// The page of the journal `name`, in HTML.
+    /// The page of the journal `name`, or of that of the run with this name, in HTML.
     ///
     /// # Errors
     /// When there is none, nothing can be shown of it, or nobody here makes pages.
@@ -48,13 +48,27 @@ impl Desk {
         page(&path).map_err(Problem::from)
     }
 
-    /// Only what is in the folder has a name: a path leads nowhere else.
+    /// Only what is in the folder has a name: a path leads nowhere else. A run has the name of its journal, too, and a file
+    /// that of what it is called without its ending.
     pub(super) fn journal_path(&self, name: &str) -> Result<PathBuf, Problem> {
-        if self.journal_names()?.iter().any(|it| it == name) {
-            return Ok(self.shared.store.runs().join(format!("{name}.jsonl")));
+        let names = self.journal_names()?;
+        let of_run = || {
+            Path::new(&self.run(name).ok()?.journal?)
+                .file_stem()?
+                .to_str()
+                .map(str::to_owned)
+        };
+        let stem = name.strip_suffix(".jsonl").unwrap_or(name);
+        let found = match names.iter().find(|it| *it == stem) {
+            Some(found) => Some(found.clone()),
+            None => of_run().filter(|it| names.contains(it)),
+        };
+        if let Some(found) = found {
+            return Ok(self.shared.store.runs().join(format!("{found}.jsonl")));
         }
         let what = format!("there is no journal {name}");
-        let help = "GET /v1/journals says which there are";
+        let help =
+            "GET /v1/journals says which there are; a run that has one says so, too (`journal`)";
         Err(Problem::new(Code::NotFound, what, help))
     }
 

@@ -28,6 +28,9 @@ pub(crate) use kept::Task;
 
 /// What it gave.
 fn show_found(view: &mut RunView, found: Found) {
+    if let Some(journal) = found.figures["journal"].as_str() {
+        view.journal = Some(journal.to_owned());
+    }
     view.result = found.figures;
     view.told = found.told.map(ToldView::from);
     view.made_worse = found.bad.as_ref().is_some_and(Failure::tells_worse);

@@ -54,6 +54,7 @@ impl Bed<'_> {
         assert_eq!((done.state, done.can_resume), (RunState::Done, false));
         let journal = left.journal.as_deref().expect("it was told");
         assert_eq!(done.result["journal"], journal);
+        assert_eq!(done.journal.as_deref(), Some(journal));
         assert_eq!(points_in(journal), kept + A_RUN as usize);
         let over = self.client.resume(&anna(), &left.id).unwrap_err();
         assert_eq!(over.code, Code::RunState, "{over}");

@@ -29,7 +29,7 @@ pub(super) async fn journals(Of(state): Of<State>) -> Result<Json<Vec<JournalVie
 
 /// A journal, as it is stored: a line of JSON for each thing that was measured.
 #[utoipa::path(
-    get, path = "/journals/{name}", tag = "journals", params(("name" = String, Path, description = "Its name")),
+    get, path = "/journals/{name}", tag = "journals", params(("name" = String, Path, description = "Its name, or that of its run")),
     responses(
         (status = 200, description = "JSON Lines", body = String, content_type = "text/plain"),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
@@ -46,7 +46,7 @@ pub(super) async fn journal(
 
 /// The page of a run: what `truestage report` makes of its journal.
 #[utoipa::path(
-    get, path = "/reports/{run}", tag = "journals", params(("run" = String, Path, description = "The name of its journal")),
+    get, path = "/reports/{run}", tag = "journals", params(("run" = String, Path, description = "Its name, or that of its journal")),
     responses(
         (status = 200, description = "One page, with everything in it", body = String, content_type = "text/html"),
         (status = "4XX", description = "There is none, or nothing can be shown of it", body = ProblemBody, content_type = "application/problem+json"),
