@@ -191,6 +191,12 @@ fn a_page_from_elsewhere_cannot_move_a_stage() {
             403
         );
         assert_eq!(ask("host: evil.example"), 403);
+        // Whichever of two comes first: nobody judges the other one.
+        let own = format!("host: {address}");
+        let page = format!("{own}\r\norigin: http://{address}");
+        assert_eq!(ask(&format!("{own}\r\nhost: evil.example")), 400);
+        assert_eq!(ask(&format!("host: evil.example\r\n{own}")), 400);
+        assert_eq!(ask(&format!("{page}\r\norigin: http://evil.example")), 400);
     });
 }
 

@@ -183,6 +183,14 @@ fn too_large(most: usize) -> Problem {
 }
 
 fn check(pages: Pages, headers: &HeaderMap) -> Result<(), Problem> {
+    // Who judges another one than the next server is let in by one and meant by the other (RFC 9112, 3.2).
+    for name in [header::HOST, header::ORIGIN] {
+        let count = headers.get_all(&name).iter().count();
+        if count > 1 {
+            let what = format!("{count} headers `{name}` in one request");
+            return Err(Problem::new(Code::BadRequest, what, "send one"));
+        }
+    }
     let scheme = match pages {
         Pages::None => return Ok(()),
         Pages::OfThisComputer => "http",
@@ -381,6 +389,25 @@ mod tests {
         assert!(named(None) && named(Some("https://stage-7.lab:8470")));
         assert!(!named(Some("http://stage-7.lab:8470")));
         assert!(!named(Some("https://evil.example")));
+    }
+
+    #[test]
+    fn two_hosts_or_origins_are_none_at_any_door() {
+        for pages in [Pages::None, Pages::OfThisComputer, Pages::OfItsName] {
+            for (host, origin) in [(2, 0), (1, 2)] {
+                let mut headers = HeaderMap::new();
+                let own = HeaderValue::from_static("localhost");
+                for _ in 0..host {
+                    headers.append(header::HOST, own.clone());
+                }
+                for _ in 0..origin {
+                    let own = HeaderValue::from_static("http://localhost");
+                    headers.append(header::ORIGIN, own);
+                }
+                let refused = check(pages, &headers).unwrap_err();
+                assert_eq!(refused.code, Code::BadRequest, "{refused}");
+            }
+        }
     }
 
     #[test]
