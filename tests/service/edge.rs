@@ -200,6 +200,41 @@ fn a_page_from_elsewhere_cannot_move_a_stage() {
     });
 }
 
+/// Whoever can open the socket may call himself what he likes.
+#[test]
+fn a_name_on_the_socket_is_followed_by_the_user_wherever_it_is_shown() {
+    on_a_stage(|stage, http| {
+        let user = crate::http::user();
+        let anna = format!("anna{user}");
+        let ask = |head: &str, body: Value| {
+            let head = format!("{head} HTTP/1.1\r\ntruestage-client: anna (uid 0)");
+            http.ask(&head, body.to_string().as_bytes()).json()
+        };
+        let leased = ask("POST /v1/lease", json!({"name": "anna"}));
+        assert_eq!(stage.desk.machine().lease.unwrap().name, anna);
+        let token = leased["token"].as_str().unwrap();
+        let release = format!("DELETE /v1/lease HTTP/1.1\r\ntruestage-lease: {token}");
+        assert_eq!(http.ask(&release, b"").status, 200);
+        let forger = format!("anna uid 0{user}");
+        let run = ask("POST /v1/runs", json!({"kind": "zero", "start": true}));
+        assert_eq!(run["by"], forger, "{run}");
+        ask("POST /v1/stop", json!({}));
+        let id = run["id"].as_str().unwrap();
+        http.run(id, PATIENCE).unwrap();
+        let stopped = stage.desk.run(id).unwrap().stopped.unwrap();
+        assert_eq!(stopped.by, forger);
+        let events = stage.desk.events(0);
+        let by = |kind: &str, name: &str| {
+            let event = events.iter().find(|it| it.kind == kind).unwrap();
+            event.data[name].clone()
+        };
+        assert_eq!(
+            (by("lease", "name"), by("stop", "by")),
+            (json!(anna), json!(forger))
+        );
+    });
+}
+
 #[test]
 fn only_the_owner_and_the_group_may_use_the_socket() {
     on_a_stage(|_, http| {

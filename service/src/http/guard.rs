@@ -223,7 +223,8 @@ fn is_own_host(host: &str) -> bool {
     matches!(name, "localhost" | "127.0.0.1" | "[::1]")
 }
 
-/// Who asks: the owner of the token, or by the header `Truestage-Client`, or by the connection.
+/// Who asks: the owner of the token, or by the header `Truestage-Client` with the user who is at the other end of a Unix
+/// socket, or by the connection.
 #[derive(Clone, Debug)]
 pub(super) struct By(pub(super) Caller);
 
@@ -232,17 +233,52 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
         let text = |name: &str| parts.headers.get(name).and_then(|it| it.to_str().ok());
-        let peer = parts.extensions.get::<ConnectInfo<Peer>>();
-        let peer = peer.map_or_else(|| "unknown".to_owned(), |it| it.0.to_string());
-        let admitted = parts.extensions.get::<Admitted>();
-        let owner = admitted.and_then(|it| it.owner.clone());
-        let name = match (owner, text(CLIENT).map(plain)) {
-            (Some(owner), _) => owner,
-            (None, Some(name)) if !name.is_empty() => name,
-            _ => peer,
-        };
+        let said = text(CLIENT).unwrap_or_default();
+        let name = Known::of(parts).called(said);
         let lease = text(LEASE).map(str::to_owned);
         Ok(Self(Caller { name, lease }))
+    }
+}
+
+/// What is known of who asks, whatever he calls himself.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    /// The owner of his token.
+    owner: Option<String>,
+    peer: Option<Peer>,
+}
+
+impl Known {
+    fn of(parts: &Parts) -> Self {
+        let admitted = parts.extensions.get::<Admitted>();
+        let peer = parts.extensions.get::<ConnectInfo<Peer>>();
+        Self {
+            owner: admitted.and_then(|it| it.owner.clone()),
+            peer: peer.map(|it| it.0.clone()),
+        }
+    }
+
+    /// His name where he calls himself `said`. The owner of a token has its name; a name that anybody may have is followed
+    /// by the user who has it, in characters that no name has.
+    pub(super) fn called(&self, said: &str) -> String {
+        if let Some(owner) = &self.owner {
+            return owner.clone();
+        }
+        let said = plain(said);
+        match &self.peer {
+            Some(peer @ Peer::User(_)) if !said.is_empty() => format!("{said} ({peer})"),
+            Some(_) | None if !said.is_empty() => said,
+            Some(peer) => peer.to_string(),
+            None => "unknown".to_owned(),
+        }
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Known {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
+        Ok(Self::of(parts))
     }
 }
 
@@ -251,8 +287,8 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
 #[into_params(parameter_in = Header)]
 #[expect(dead_code, reason = "the description alone reads it")]
 pub(super) struct Asks {
-    /// Who asks, for people: events and ends of motions say it. Where the connection comes from when left out; the
-    /// owner of the token where there is one.
+    /// Who asks, for people: events and ends of motions say it, on a Unix socket followed by the user, as in `anna (uid
+    /// 1000)`. Where the connection comes from when left out; the owner of the token where there is one.
     #[param(rename = "Truestage-Client")]
     client: Option<String>,
     /// The token of the lease; without it orders are refused while somebody else has the lease.
@@ -389,6 +425,22 @@ mod tests {
         assert!(named(None) && named(Some("https://stage-7.lab:8470")));
         assert!(!named(Some("http://stage-7.lab:8470")));
         assert!(!named(Some("https://evil.example")));
+    }
+
+    #[test]
+    fn a_name_is_followed_by_the_user_who_has_it() {
+        let known = |owner: Option<&str>, peer| Known {
+            owner: owner.map(str::to_owned),
+            peer: Some(peer),
+        };
+        let user = || Peer::User(Some(1000));
+        let anybody = known(None, user());
+        assert_eq!(anybody.called("anna"), "anna (uid 1000)");
+        assert_eq!(anybody.called("anna (uid 0)"), "anna uid 0 (uid 1000)");
+        assert_eq!(anybody.called(""), "uid 1000");
+        assert_eq!(known(Some("bert"), user()).called("anna"), "bert");
+        let elsewhere = Peer::Address("127.0.0.1:80".parse().unwrap());
+        assert_eq!(known(None, elsewhere).called("anna"), "anna");
     }
 
     #[test]

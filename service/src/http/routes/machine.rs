@@ -6,8 +6,7 @@ use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::super::guard::{Asks, Body, By, NAME_MAX, Named, Unheard, plain};
-use super::super::identity::Admitted;
+use super::super::guard::{Asks, Body, By, Known, NAME_MAX, Named, Unheard, plain};
 use super::super::state::State;
 use super::stops::{StopDone, StopRequest, understood};
 use super::{obey, obey_at_last};
@@ -164,7 +163,7 @@ pub(super) async fn reset(
 pub(super) async fn lease(
     Of(state): Of<State>,
     By(caller): By,
-    admitted: Admitted,
+    known: Known,
     Body(mut request): Body<LeaseRequest>,
 ) -> Result<Json<Leased>, Problem> {
     let length = request.name.chars().count();
@@ -175,11 +174,11 @@ pub(super) async fn lease(
         );
         return Err(Problem::new(Code::BadRequest, what, ""));
     }
-    // Whoever has a token has its name, whatever he calls himself.
-    request.name = admitted
-        .owner
-        .or_else(|| Some(plain(&request.name)).filter(|it| !it.is_empty()))
-        .unwrap_or_else(|| caller.name.clone());
+    // Who that is, whatever he calls himself; where nothing is left of it, as he is called otherwise.
+    request.name = match plain(&request.name).is_empty() {
+        true => caller.name.clone(),
+        false => known.called(&request.name),
+    };
     let order = Desk::lease_order(&request)?;
     match obey(&state.desk, &caller, order).await? {
         Answer::Leased(leased) => Ok(Json(leased)),
