@@ -53,6 +53,12 @@ fn a_person_at_the_page_takes_a_machine_through_its_cycle_and_through_a_lost_con
     for look in ["1100_light", "1100_dark", "360_light", "360_dark"] {
         assert_eq!(report["looks"][look], true, "{look}: {report}");
     }
+    let robbed = json!([
+        "Take control from anna",
+        "Yes, take control from anna",
+        "anna"
+    ]);
+    assert_eq!(report["robbed"], robbed, "{report}");
     let reached = report["keyboard"].as_array().expect("what Tab reaches");
     for id in ["file", "rows", "Plan"] {
         assert!(reached.iter().any(|it| it == id), "{id}: {report}");

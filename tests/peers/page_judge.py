@@ -95,8 +95,25 @@ class Person:
     def take_control(self):
         if self.browser.value("document.getElementById('take').hidden"):
             return
-        self.browser.value("document.getElementById('take').click()")
-        self.browser.wait_for("control", "document.getElementById('take').hidden")
+        take = "document.getElementById('take')"
+        self.browser.value(f"{take}.click()")
+        self.browser.wait_for("control, or a question", f"{take}.hidden || {take}.dataset.sure === 'yes'")
+        if not self.browser.value(f"{take}.hidden"):
+            self.browser.value(f"{take}.click()")
+            self.browser.wait_for("control", f"{take}.hidden")
+
+    def robbed(self, kept):
+        """Somebody else takes control by force, and it is taken back; what the button says meanwhile."""
+        self.take_control()
+        take = "document.getElementById('take')"
+        kept.ask("POST", "/v1/lease", {"name": "anna", "seconds": 3600, "force": True})
+        lost = self.browser.wait_for("word of it", f"!{take}.hidden && {take}.textContent.includes('anna') && {take}.textContent")
+        self.browser.value(f"{take}.click()")
+        asked = self.browser.wait_for("a question", f"{take}.dataset.sure === 'yes' && {take}.textContent")
+        held = kept.ask("GET", "/v1/machine")["lease"]["name"]
+        self.browser.value(f"{take}.click()")
+        self.browser.wait_for("control", f"{take}.hidden")
+        return [lost, asked, held]
 
     def run(self, kind):
         """Plans a run, starts it, and waits for its end; what the page says of it then."""
@@ -250,7 +267,9 @@ def commanded(kept, browser):
     report["looks"] = looks(browser, SHOTS)
     report["job"] = person.job()
     report["keyboard"] = by_keyboard(browser)
-    errors = list(browser.errors)
+    report["robbed"] = person.robbed(kept)
+    # What is refused for the lease, a browser logs.
+    errors = [it for it in browser.errors if "423" not in it]
     kept.kill_service()
     browser.wait_for("word of the lost connection", f"{state}.includes('connection lost')")
     kept.serve_again()

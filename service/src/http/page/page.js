@@ -16,6 +16,9 @@ const ALONG = { path: ["path", "Rows: time_s,x_mm,y_mm,z_mm"], first_part: ["pat
 
 const byId = (id) => document.getElementById(id);
 let token = null;
+// Who has it by what the service says, and whether somebody who was asked wants it all the same.
+let holder = null;
+let sure = false;
 let renewing = null;
 let renewal = null;
 const plans = new Map();
@@ -29,7 +32,7 @@ async function ask(method, path, body) {
   if (token) headers["truestage-lease"] = token;
   const answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
   const value = await answer.json();
-  if (!answer.ok) throw new Error(value.detail);
+  if (!answer.ok) throw Object.assign(new Error(value.detail), { code: value.code });
   return value;
 }
 
@@ -48,9 +51,8 @@ function showMachine(machine) {
   const cause = machine.cause ? `: ${machine.cause.cause}` : "";
   byId("state").textContent = machine.state.replace("_", " ") + cause;
   byId("state").className = machine.state === "error_stop" ? "failed" : "";
-  const other = machine.lease && !token;
-  byId("take").textContent = other ? `Take control from ${machine.lease.name}` : "Take control";
-  byId("take").dataset.force = other ? "yes" : "";
+  holder = machine.lease ? machine.lease.name : null;
+  showTake();
   showGroups(machine.groups);
 }
 
@@ -88,19 +90,35 @@ function showGroups(groups) {
   }
 }
 
+// Whose control it would be that is taken: whoever presses it twice takes it from him.
+function showTake() {
+  const from = token === null && holder !== null ? ` from ${holder}` : "";
+  byId("take").textContent = sure ? `Yes, take control${from}` : `Take control${from}`;
+  byId("take").dataset.sure = sure ? "yes" : "";
+}
+
 function showControl() {
   const mine = token !== null;
   byId("control-text").textContent = mine
     ? "This page commands the machine; STOP works for everybody."
     : "Read-only. STOP works all the same.";
+  showTake();
   byId("take").hidden = mine;
   byId("give").hidden = !mine;
   for (const it of document.querySelectorAll(".command")) it.disabled = !mine;
 }
 
 async function take() {
-  const force = byId("take").dataset.force === "yes";
-  const leased = await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S, force });
+  const force = sure;
+  sure = false;
+  let leased;
+  try {
+    leased = await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S, force });
+  } catch (error) {
+    sure = error.code === "leased";
+    showMachine(await ask("GET", "/v1/machine"));
+    throw sure ? new Error(`${holder || "somebody"} has control, and is told when it is taken: press again to take it`) : error;
+  }
   token = leased.token;
   clearInterval(renewing);
   renewing = setInterval(() => { renewal = renew().finally(() => { renewal = null; }); }, RENEW_MS);
@@ -113,18 +131,21 @@ async function renew() {
     token = (await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S })).token;
   } catch (error) {
     lose();
+    // Who has it now: the event of that may have come while this page thought that it had it.
+    ask("GET", "/v1/machine").then(showMachine).catch(() => {});
     byId("problem").textContent = `control was lost: ${error.message}`;
   }
 }
 
 function lose() {
-  token = null;
+  [token, sure] = [null, false];
   clearInterval(renewing);
   showControl();
 }
 
 async function give() {
   await ask("DELETE", "/v1/lease");
+  holder = null;
   lose();
 }
 
@@ -418,6 +439,7 @@ function follow(after) {
 byId("stop").addEventListener("click", () => told(ask("POST", "/v1/stop", {})));
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") told(ask("POST", "/v1/stop", {})); });
 byId("take").addEventListener("click", () => told(take()));
+byId("take").addEventListener("blur", () => { sure = false; showTake(); });
 byId("give").addEventListener("click", () => told(give()));
 byId("reset").addEventListener("click", () => told(ask("POST", "/v1/reset")));
 byId("plan").addEventListener("submit", (event) => {
