@@ -245,6 +245,8 @@ fn length(
 
 /// Which approaches the header names, and whether it names uncertainties.
 fn named(text: &str) -> (bool, bool, bool) {
+    // The mark that spreadsheets begin with would hide that the first line is a comment.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let is_header = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
     let header = text.lines().find(is_header).unwrap_or_default();
     let has = |start: &str| header.split(',').any(|it| it.trim().starts_with(start));
@@ -272,6 +274,13 @@ mod tests {
     fn check(text: &str, expected: &str) {
         let failure = ErrorTable::from_csv(text, "t.csv").unwrap_err().to_string();
         assert!(failure.contains(expected), "{failure}");
+    }
+
+    #[test]
+    fn a_byte_order_mark_before_a_comment_changes_nothing() {
+        let text = "# a table\nposition_mm,forward_um,reverse_um,u_forward_um,u_reverse_um\n0,0,1,1,1\n9,2,3,1,1\n";
+        let marked = ErrorTable::from_csv(&format!("\u{feff}{text}"), "t.csv");
+        assert_eq!(marked, ErrorTable::from_csv(text, "t.csv"));
     }
 
     #[test]

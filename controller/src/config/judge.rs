@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use units::Short;
 
+use super::diagnostic::shown;
+use super::meant::word_meant;
+
 /// Something that cannot be, at a dotted key.
 #[derive(Clone, Debug)]
 pub(crate) struct Finding {
@@ -73,16 +76,23 @@ impl<'a> Judge<'a> {
         kind: &str,
     ) {
         if !table.contains_key(name) {
-            let names = table
-                .keys()
-                .map(String::as_str)
-                .collect::<Vec<_>>()
-                .join(", ");
-            self.say(
-                key,
-                format!("there is no {kind} `{name}`"),
-                format!("known: {names}"),
-            );
+            let names: Vec<&str> = table.keys().map(String::as_str).collect();
+            let known = match names.is_empty() {
+                true => format!("there is none: add a section for a {kind}"),
+                false => format!("known: {}", names.join(", ")),
+            };
+            let help = match word_meant(name, &names) {
+                Some(meant) => format!("did you mean `{meant}`? {}", capital(&known)),
+                None => known,
+            };
+            self.say(key, format!("there is no {kind} `{}`", shown(name)), help);
         }
     }
+}
+
+/// As a sentence begins.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }

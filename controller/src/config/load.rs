@@ -5,7 +5,7 @@ use std::path::Path;
 use machine::records::ConfigHash;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use toml::{Table, Value};
 
 use super::certificates;
 use super::dependence::hash_of;
@@ -13,11 +13,13 @@ use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
 use super::model::MachineConfig;
 use super::place::span_of;
+use super::repair::{Repair, repaired};
 use super::schema;
 use super::structure::{self, Part};
-use super::syntax;
+use super::syntax::{self, Recovered};
 use super::validate::{Finding, validate};
 use super::warnings;
+use super::whole;
 use crate::certificate;
 use machine::Patience;
 
@@ -46,10 +48,7 @@ pub struct Loaded {
 /// When the file cannot be read, is no TOML, has unknown or missing keys, or asks for
 /// something impossible; every finding names line and column.
 pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = whole::text_of(path)?;
     // Relative to the file, not to whoever calls: from another folder the machine must find the
     // same calibrations and take the same lease.
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -83,6 +82,9 @@ pub fn parse(text: &str, file: &str) -> Result<Loaded, ConfigError> {
 
 /// Likewise of a file whose folder is known: the paths of its certificates count from there.
 fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, ConfigError> {
+    if let Some(error) = whole::no_machine(text, file) {
+        return Err(error);
+    }
     let mut config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
     let mut findings = Vec::new();
     certificate::read(config.certificates_mut(), folder, &mut findings);
@@ -140,7 +142,7 @@ pub(crate) fn filled_in(unfilled: &[Diagnostic]) -> Result<(), ConfigError> {
 pub(crate) fn read<C: DeserializeOwned + JsonSchema>(
     text: &str,
     file: &str,
-    judge: impl FnOnce(&C) -> Vec<Finding>,
+    judge: impl FnMut(&C) -> Vec<Finding>,
 ) -> Result<C, ConfigError> {
     read_by(text, file, &schema::inline_of::<C>(), judge)
 }
@@ -148,29 +150,64 @@ pub(crate) fn read<C: DeserializeOwned + JsonSchema>(
 fn read_by<C: DeserializeOwned>(
     text: &str,
     file: &str,
-    schema: &Value,
-    judge: impl FnOnce(&C) -> Vec<Finding>,
+    schema: &serde_json::Value,
+    judge: impl FnMut(&C) -> Vec<Finding>,
 ) -> Result<C, ConfigError> {
-    let document: toml::Table = toml::from_str(text).map_err(|error| syntax(text, file, &error))?;
-    let mut findings = structure::judge(&document, schema);
-    let is_readable = findings.iter().all(|(_, part)| *part == Part::Size);
-    let config: C = match toml::from_str(text) {
-        Ok(config) if is_readable => config,
-        // The schema is made of the same declarations: what it lets pass can be read.
-        Err(error) if findings.is_empty() => return Err(syntax(text, file, &error)),
-        Ok(_) | Err(_) => return Err(invalid(text, file, findings)),
+    if let Some(error) = whole::told(text, file) {
+        return Err(error);
+    }
+    let (document, recovered) = match text.parse::<Table>() {
+        Ok(document) => (document, Recovered::of(text)),
+        Err(error) => {
+            let recovered = syntax::recovered(text, file);
+            match recovered.text.parse::<Table>() {
+                Ok(document) => (document, recovered),
+                Err(_) => return Err(unreadable(text, file, &error)),
+            }
+        }
     };
-    let impossible: Vec<_> = findings.iter().map(|(it, _)| it.key.clone()).collect();
-    for finding in judge(&config) {
+    let found = structure::judge(&document, schema, &recovered.unread);
+    let (mut findings, repairs) = (found.findings, found.repairs);
+    let config = Value::Table(repaired(document, &repairs)).try_into::<C>();
+    let is_sound = findings.is_empty() && recovered.findings.is_empty();
+    let config = match config {
+        Ok(config) => Some(config),
+        // The schema is made of the same declarations: what it lets pass can be read.
+        Err(error) if is_sound => return Err(unreadable(text, file, &error)),
+        Err(_) => None,
+    };
+    let of_findings = findings.iter().map(|(it, _)| it.key.clone());
+    let told: Vec<_> = of_findings
+        .chain(repairs.iter().flat_map(Repair::doubted))
+        .collect();
+    // By a value that cannot be read nothing else can be judged, not even by what it is when it is not there.
+    let is_whole = recovered.unread.is_empty();
+    for finding in config.iter().filter(|_| is_whole).flat_map(judge) {
         // What is impossible by itself is told once, and not again of the section around it.
-        if !impossible.iter().any(|key| is_within(key, &finding.key)) {
+        if !told.iter().any(|key| is_within(key, &finding.key)) {
             findings.push((finding, Part::Value));
         }
     }
-    match findings.is_empty() {
-        true => Ok(config),
-        false => Err(invalid(text, file, findings)),
+    match config {
+        Some(config) if is_sound && findings.is_empty() => Ok(config),
+        _ => Err(refused(recovered, file, findings)),
     }
+}
+
+/// All findings, in the order of the file.
+fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> ConfigError {
+    let findings = findings.into_iter();
+    let findings = findings.filter(|(it, _)| !recovered.contested.contains(&it.key));
+    let mut found = placed(&recovered.text, file, findings);
+    let is_mistaken = |it: &&Diagnostic| {
+        it.cause.starts_with("expected") && recovered.taken_for_text.contains(&it.line)
+    };
+    // A word where a number belongs is told as that.
+    let mistaken: Vec<_> = found.iter().filter(is_mistaken).map(|it| it.line).collect();
+    let of_syntax = recovered.findings.into_iter();
+    found.extend(of_syntax.filter(|it| !mistaken.contains(&it.line)));
+    found.sort_by_key(|it| (it.line, it.column));
+    ConfigError::Invalid { findings: found }
 }
 
 /// Whether `key` is `section` or stands in it.
@@ -179,11 +216,12 @@ fn is_within(key: &str, section: &str) -> bool {
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
+/// What can be said of neither its lines nor its keys.
+fn unreadable(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let span = error.span().unwrap_or(0..0);
-    let message = error.message().lines().next().unwrap_or("not valid");
-    let Finding { key, cause, help } = syntax::explained(text, &span, message);
-    let finding = Diagnostic::at(file, text, &span, &key, cause, help);
+    let cause = error.message().lines().next().unwrap_or("not valid");
+    let help = "compare it with configs/README.md, which describes every key";
+    let finding = Diagnostic::at(file, text, &span, "", cause.to_owned(), help.into());
     ConfigError::Invalid {
         findings: vec![finding],
     }
@@ -207,6 +245,7 @@ fn placed(
     });
     let mut placed: Vec<_> = placed.collect();
     placed.sort_by_key(|it| (it.line, it.column));
+    placed.dedup();
     placed
 }
 

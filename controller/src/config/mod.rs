@@ -17,19 +17,23 @@ pub(crate) mod judge;
 pub(crate) mod least_time;
 pub(crate) mod lines;
 mod load;
+mod meant;
 mod model;
 #[cfg(test)]
 mod mutated_tests;
 mod place;
 #[cfg(test)]
 mod reference;
+mod repair;
 pub(crate) mod schema;
+mod slips;
 mod structure;
 mod syntax;
 mod unit;
 pub(crate) mod validate;
 pub(crate) mod warnings;
 mod watch_warnings;
+mod whole;
 
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;

@@ -1,15 +1,23 @@
 //! Whether a file has the keys, types and ranges that its schema says.
 
-use std::collections::BTreeMap;
+mod places;
+mod section;
+mod unknown;
+mod written;
 
 use serde_json::Value as Schema;
 use toml::{Table, Value};
 use units::Short;
 
+use super::diagnostic::shown;
 use super::judge::Finding;
 use super::lines::below;
+use super::meant::word_meant;
+use super::repair::Repair;
 use super::schema::{DEVICE, type_of, without_null};
-use super::unit::{is_unit, split_unit};
+use section::Section;
+use unknown::{is_part_of_one, merged, unknown, without_name};
+use written::{converted, correction, in_words, kind};
 
 /// What is wrong with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,44 +33,90 @@ pub(super) enum Part {
 /// What was found, by keys, and which part of each it is.
 type Findings = Vec<(Finding, Part)>;
 
-/// All that is not as `schema` says.
-pub(super) fn judge(document: &Table, schema: &Schema) -> Findings {
-    let mut findings = Vec::new();
-    table("", document, schema, &mut findings);
-    findings
+/// What is told of a file.
+pub(super) struct Found<'a> {
+    pub(super) findings: Findings,
+    /// What makes a file that can be read all the same of it, as far as that can be told.
+    pub(super) repairs: Vec<Repair>,
+    /// Keys that are there and cannot be read.
+    unread: &'a [String],
+    schema: &'a Schema,
+    /// The sections that are being judged, from the outermost on, with their keys.
+    above: Vec<(String, Vec<String>)>,
 }
 
-fn say(findings: &mut Findings, key: &str, cause: String, help: String) {
+impl Found<'_> {
+    fn replace(&mut self, key: &str, value: Option<Value>) {
+        let key = key.to_owned();
+        self.repairs
+            .extend(value.map(|value| Repair::Replace { key, value }));
+    }
+
+    /// The section around this one that has such a key, and the one that has it wherever it is.
+    fn home_of(&self, key: &str) -> Option<String> {
+        let (_, around) = self.above.split_last()?;
+        let home = around
+            .iter()
+            .rev()
+            .find(|(_, keys)| keys.iter().any(|it| it == key));
+        home.map(|(path, _)| match path.is_empty() {
+            true => format!("`{key}` stands above all sections"),
+            false => {
+                format!("`{key}` is a key of [{path}]: write it there, above the sections in it")
+            }
+        })
+    }
+}
+
+/// All that is not as `schema` says; `unread` are keys that are there and cannot be read.
+pub(super) fn judge<'a>(document: &Table, schema: &'a Schema, unread: &'a [String]) -> Found<'a> {
+    let mut found = Found {
+        findings: Vec::new(),
+        repairs: Vec::new(),
+        unread,
+        schema,
+        above: Vec::new(),
+    };
+    table("", document, schema, &mut found);
+    found
+}
+
+fn say(found: &mut Found<'_>, key: &str, cause: String, help: String) {
     let key = key.to_owned();
-    findings.push((Finding { key, cause, help }, Part::Value));
+    found
+        .findings
+        .push((Finding { key, cause, help }, Part::Value));
 }
 
-fn say_size(findings: &mut Findings, key: &str, seen: f64, help: String) {
+fn say_size(found: &mut Found<'_>, key: &str, seen: f64, help: String) {
     let (key, cause) = (key.to_owned(), format!("{} is impossible", Short(seen)));
-    findings.push((Finding { key, cause, help }, Part::Size));
+    found
+        .findings
+        .push((Finding { key, cause, help }, Part::Size));
 }
 
-fn any(path: &str, value: &Value, schema: &Schema, findings: &mut Findings) {
+fn any(path: &str, value: &Value, schema: &Schema, found: &mut Found<'_>) {
     if let Some(variants) = schema.as_array() {
         let words = variants.iter();
         let words = words.filter_map(|it| it["properties"][DEVICE]["const"].as_str());
-        return name(path, value, &words.collect::<Vec<_>>(), findings);
+        return name(path, value, &words.collect::<Vec<_>>(), found);
     }
     let schema = fitting(schema, value);
     if let Some(names) = names(schema) {
-        return name(path, value, &names, findings);
+        return name(path, value, &names, found);
     }
     let seen = kind(value);
     match (type_of(schema), value) {
-        ("object", Value::Table(inner)) => table(path, inner, schema, findings),
-        ("array", Value::Array(items)) => array(path, items, schema, findings),
-        ("number", Value::Float(it)) => number(path, *it, schema, findings),
+        ("object", Value::Table(inner)) => table(path, inner, schema, found),
+        ("array", Value::Array(items)) => array(path, items, schema, found),
+        ("number", Value::Float(it)) => number(path, *it, schema, found),
         // Whoever writes 5 means 5.0.
-        ("number" | "integer", Value::Integer(it)) => number(path, *it as f64, schema, findings),
+        ("number" | "integer", Value::Integer(it)) => number(path, *it as f64, schema, found),
         ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
         (expected, _) => {
             let cause = format!("expected {} here, this is {seen}", in_words(expected));
-            say(findings, path, cause, correction(expected, value));
+            found.replace(path, converted(expected, value));
+            say(found, path, cause, correction(expected, value));
         }
     }
 }
@@ -79,195 +133,59 @@ fn fitting<'a>(schema: &'a Schema, value: &Value) -> &'a Schema {
     fits.unwrap_or_else(|| without_null(schema))
 }
 
-fn in_words(expected: &str) -> &'static str {
-    match expected {
-        "object" => "a section",
-        "array" => "a list",
-        "number" => "a number",
-        "integer" => "a whole number",
-        "boolean" => "`true` or `false`",
-        _ => "text",
-    }
-}
-
-const fn kind(value: &Value) -> &'static str {
-    match value {
-        Value::String(_) => "text",
-        Value::Integer(_) => "a whole number",
-        Value::Float(_) => "a number",
-        Value::Boolean(_) => "`true` or `false`",
-        Value::Datetime(_) => "a date",
-        Value::Array(_) => "a list",
-        Value::Table(_) => "a section",
-    }
-}
-
-fn correction(expected: &str, value: &Value) -> String {
-    match (expected, value) {
-        ("number" | "integer", Value::String(text)) => match number_in(text) {
-            Some(number) if number == text => format!("write it without quotes: {number}"),
-            Some(number) => {
-                format!("write it without quotes and unit: {number}; a key's ending is its unit")
-            }
-            None => format!("give {}", in_words(expected)),
-        },
-        ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
-            format!("write it in quotes: \"{value}\"")
-        }
-        ("integer", Value::Float(it)) => format!("write {:.0}", it),
-        ("array", Value::Table(_)) => "write a list: [...]".into(),
-        ("array", _) => "write it in brackets: [...]".into(),
-        ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
-            [one] => format!("write it without brackets: {one}"),
-            _ => format!("give {} and no list", in_words(expected)),
-        },
-        ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),
-        _ => format!("give {}", in_words(expected)),
-    }
-}
-
-/// The number of a text that is one, with a unit or without.
-fn number_in(text: &str) -> Option<&str> {
-    let text = text.trim();
-    let digits = text.strip_prefix("0x").unwrap_or_default();
-    if !digits.is_empty() && digits.chars().all(|it| it.is_ascii_hexdigit() || it == '_') {
-        return Some(text);
-    }
-    let (number, unit) = split_unit(text)?;
-    unit.is_none_or(is_unit).then_some(number)
-}
-
-fn table(path: &str, seen: &Table, schema: &Schema, findings: &mut Findings) {
+fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     if schema["properties"].is_null() {
         // Named by the user, all alike.
+        let own = &schema["additionalProperties"];
         for (key, value) in seen {
-            let own = &schema["additionalProperties"];
-            any(&below(path, key), value, own, findings);
+            match value {
+                Value::Table(inner) if is_part_of_one(key, inner, own) => {
+                    without_name(path, key, seen, found);
+                }
+                _ => any(&below(path, key), value, own, found),
+            }
         }
         return;
     }
     let section = Section::of(schema, seen);
+    let merged = merged(seen, &section);
+    let names = section.keys.keys().map(|it| (*it).to_owned());
+    found.above.push((path.to_owned(), names.collect()));
     let keys = section.keys.keys().copied();
     let free: Vec<&str> = keys.filter(|it| !seen.contains_key(*it)).collect();
     let mut mistyped = Vec::new();
     for (key, value) in seen {
         match section.keys.get(key.as_str()) {
-            Some(own) => any(&below(path, key), value, own, findings),
-            None => {
-                let is_anothers = section.is_of_another_device(key);
-                if is_anothers && section.device.is_none() {
-                    // Nobody knows yet which device it is.
-                    continue;
-                }
-                let (cause, help) = match is_anothers {
-                    true => (section.has_no_such_key(), "remove it".to_owned()),
-                    false => {
-                        // What must be there and is not comes first.
-                        let lacks = meant(key, &section.lacking(&free));
-                        let meant = lacks.or_else(|| meant(key, &free));
-                        mistyped.extend(meant);
-                        let cause = "there is no such key here".to_owned();
-                        let part = section.part_meant(key, value);
-                        (cause, part.unwrap_or_else(|| advice(meant, &free)))
-                    }
-                };
-                let key = below(path, key);
-                findings.push((Finding { key, cause, help }, Part::Name));
+            Some(own) => {
+                let value = merged.get(key).unwrap_or(value);
+                any(&below(path, key), value, own, found);
             }
+            None => mistyped.extend(unknown((path, key), value, &section, &free, found)),
         }
     }
-    // What was only mistyped is told once.
+    // What was only mistyped, or cannot be read, is told once.
     let missed = section.required.iter();
     let missed = missed.filter(|it| free.contains(it) && !mistyped.contains(it));
     for key in missed {
-        missing(path, key, section.keys[*key], findings);
+        if !found.unread.contains(&below(path, key)) {
+            missing(path, key, section.keys[*key], found);
+        }
     }
+    found.above.pop();
 }
 
-/// What a section can hold, with the device that it is about, where it is about one.
-struct Section<'a> {
-    keys: BTreeMap<&'a str, &'a Schema>,
-    required: Vec<&'a str>,
-    device: Option<&'a str>,
-    /// Of devices that it is not about.
-    others: Vec<&'a str>,
-}
-
-impl<'a> Section<'a> {
-    fn of(schema: &'a Schema, seen: &Table) -> Self {
-        let mut section = Self {
-            keys: BTreeMap::new(),
-            required: Vec::new(),
-            device: None,
-            others: Vec::new(),
-        };
-        section.add(schema);
-        let word = seen.get(DEVICE).and_then(Value::as_str);
-        let variants = schema["oneOf"].as_array().into_iter().flatten();
-        for variant in variants.clone() {
-            let device = variant["properties"][DEVICE]["const"].as_str();
-            if device.is_some() && device == word {
-                section.device = device;
-                section.add(variant);
-            } else {
-                let keys = variant["properties"].as_object().into_iter().flatten();
-                section.others.extend(keys.map(|(key, _)| key.as_str()));
-            }
-        }
-        if section.device.is_none() && variants.clone().next().is_some() {
-            // What it can be is told where the word stands.
-            section.keys.insert(DEVICE, &schema["oneOf"]);
-            section.required.push(DEVICE);
-        }
-        section
-    }
-
-    fn add(&mut self, part: &'a Schema) {
-        let keys = part["properties"].as_object().into_iter().flatten();
-        self.keys.extend(keys.map(|(key, own)| (key.as_str(), own)));
-        let required = part["required"].as_array().into_iter().flatten();
-        self.required.extend(required.filter_map(Schema::as_str));
-    }
-
-    /// The keys of `free` that must be there.
-    fn lacking(&self, free: &[&'a str]) -> Vec<&'a str> {
-        let lacks = free.iter().filter(|it| self.required.contains(it));
-        lacks.copied().collect()
-    }
-
-    /// What to say of a mistyped part of a section's name (`[axsi.x.zero]`), which other sections may have right.
-    fn part_meant(&self, key: &str, value: &Value) -> Option<String> {
-        let lists = value
-            .as_array()
-            .is_some_and(|it| it.iter().all(Value::is_table));
-        if !(value.is_table() || lists) {
-            return None;
-        }
-        let keys: Vec<&str> = self.keys.keys().copied().collect();
-        let key = meant(key, &keys)?;
-        Some(format!("did you mean `{key}`?"))
-    }
-
-    fn is_of_another_device(&self, key: &str) -> bool {
-        self.others.contains(&key)
-    }
-
-    fn has_no_such_key(&self) -> String {
-        let device = self.device.unwrap_or_default();
-        format!("`device = \"{device}\"` has no such key")
-    }
-}
-
-fn missing(path: &str, key: &str, schema: &Schema, findings: &mut Findings) {
+fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
     let what = match type_of(without_null(schema)) {
-        "object" if names(schema).is_none() => format!("the section `{}`", below(path, key)),
+        "object" if names(schema).is_none() && key != DEVICE => {
+            format!("the section `{}`", below(path, key))
+        }
         _ => format!("`{key}`"),
     };
     let help = format!("add {what}; configs/README.md describes every key");
-    say(findings, path, format!("missing {what}"), help);
+    say(found, path, format!("missing {what}"), help);
 }
 
-fn array(path: &str, items: &[Value], schema: &Schema, findings: &mut Findings) {
+fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
     let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
     let count = items.len() as u64;
     if least.is_some_and(|it| count < it) || most.is_some_and(|it| count > it) {
@@ -281,10 +199,16 @@ fn array(path: &str, items: &[Value], schema: &Schema, findings: &mut Findings) 
             ),
         };
         say(
-            findings,
+            found,
             path,
-            format!("{count} entries"),
-            format!("give {wanted}"),
+            match count {
+                1 => "1 entry".to_owned(),
+                count => format!("{count} entries"),
+            },
+            match has_commas(items, least) {
+                true => format!("give {wanted}, with a point before the decimals: 1.5"),
+                false => format!("give {wanted}"),
+            },
         );
         return;
     }
@@ -294,13 +218,20 @@ fn array(path: &str, items: &[Value], schema: &Schema, findings: &mut Findings) 
             Value::Table(_) => below(path, &at.to_string()),
             _ => path.to_owned(),
         };
-        let found = findings.len();
-        any(&own, item, &schema["items"], findings);
+        let told = found.findings.len();
+        any(&own, item, &schema["items"], found);
         // Our own words stand at the list; they hold for each number of it.
-        if let (Some(seen), true) = (figure(item), findings.len() == found) {
-            number(&own, seen, schema, findings);
+        if let (Some(seen), true) = (figure(item), found.findings.len() == told) {
+            number(&own, seen, schema, found);
         }
     }
+}
+
+/// Whether it may be `[0,5, 1,5]` for `[0.5, 1.5]`.
+fn has_commas(items: &[Value], wanted: Option<u64>) -> bool {
+    let is_whole = |it: &Value| it.is_integer() || it.is_float();
+    let is_twice = wanted.is_some_and(|it| it > 0 && items.len() as u64 == 2 * it);
+    is_twice && items.iter().all(is_whole)
 }
 
 fn figure(value: &Value) -> Option<f64> {
@@ -311,7 +242,7 @@ fn figure(value: &Value) -> Option<f64> {
     }
 }
 
-fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
+fn number(path: &str, seen: f64, schema: &Schema, found: &mut Found<'_>) {
     let bound = |key: &str| schema[key].as_f64();
     let (least, most) = whole_numbers(schema);
     let (low, high) = match schema["x-magnitude"].as_array() {
@@ -332,12 +263,12 @@ fn number(path: &str, seen: f64, schema: &Schema, findings: &mut Findings) {
             (None, Some(high)) => format!("give {} or less", whole(high)),
             (None, None) => "give a number".into(),
         };
-        say_size(findings, path, seen, help);
+        say_size(found, path, seen, help);
         return;
     }
     if let Some(limit) = schema["x-above"].as_f64().filter(|it| seen <= *it) {
         let help = format!("give more than {}", Short(limit));
-        say_size(findings, path, seen, help);
+        say_size(found, path, seen, help);
     }
 }
 
@@ -376,62 +307,29 @@ fn names(schema: &Schema) -> Option<Vec<&str>> {
     Some(words?.concat())
 }
 
-fn name(path: &str, value: &Value, names: &[&str], findings: &mut Findings) {
-    let seen = match value {
-        Value::String(text) if names.contains(&text.as_str()) => return,
-        Value::String(text) => format!("`{text}`"),
-        other => kind(other).to_owned(),
-    };
+fn name(path: &str, value: &Value, names: &[&str], found: &mut Found<'_>) {
     let known: Vec<_> = names.iter().map(|it| format!("\"{it}\"")).collect();
-    let help = format!("give {}", known.join(" or "));
-    say(findings, path, format!("{seen} is not known here"), help);
-}
-
-/// What to write in place of a key that is not known, which may have `meant` another one.
-fn advice(meant: Option<&str>, free: &[&str]) -> String {
-    match meant {
-        Some(key) => format!("did you mean `{key}`? A key's ending is its unit"),
-        None if free.is_empty() => "remove it: every key of this section is there".into(),
-        None => format!("known here: {}", free.join(", ")),
-    }
-}
-
-/// The key of `free` that is most like `seen`, if one is.
-fn meant<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
-    let likeness = |key: &str| {
-        let whole = strsim::normalized_damerau_levenshtein(key, seen);
-        // With another unit it is still the same quantity.
-        whole.max(strsim::normalized_damerau_levenshtein(stem(key), stem(seen)) * STEM_WEIGHT)
+    let known = known.join(" or ");
+    let Value::String(text) = value else {
+        let cause = format!("expected a word here, this is {}", kind(value));
+        return say(found, path, cause, format!("give {known}"));
     };
-    let scored = free.iter().map(|key| (likeness(key), *key));
-    let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    match best.0 >= LIKE {
-        true => Some(best.1),
-        false => with_words_left_out(seen, free),
+    if names.contains(&text.as_str()) {
+        return;
     }
-}
-
-/// The only key of `free` that has all words of `seen`, and more.
-fn with_words_left_out<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
-    let has_all = |key: &&&str| {
-        let mut words = key.split('_');
-        seen.split('_').all(|wanted| words.any(|it| it == wanted))
+    let meant = word_meant(text, names);
+    found.replace(path, meant.map(|it| Value::String(it.to_owned())));
+    let help = match meant {
+        Some(word) if names.len() > 1 => format!("did you mean \"{word}\"? It can be {known}"),
+        Some(word) => format!("did you mean \"{word}\"?"),
+        None => format!("give {known}"),
     };
-    let mut longer = free.iter().filter(has_all);
-    match (longer.next(), longer.next()) {
-        (Some(only), None) => Some(only),
-        _ => None,
-    }
-}
-
-/// So much alike two words are one that was mistyped.
-const LIKE: f64 = 0.6;
-/// A key that is right as a whole is nearer than one that is right but for its unit.
-const STEM_WEIGHT: f64 = 0.95;
-
-/// A key without its unit.
-fn stem(key: &str) -> &str {
-    key.rsplit_once('_').map_or(key, |(stem, _)| stem)
+    say(
+        found,
+        path,
+        format!("`{}` is not known here", shown(text)),
+        help,
+    );
 }
 
 #[cfg(test)]

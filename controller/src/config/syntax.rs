@@ -1,171 +1,201 @@
-//! What is no TOML, in the words of whoever wrote it: the key, what stands there, what to write.
+//! A text that is no TOML: each line that is not, in the words of whoever wrote it, and the text without them, so that
+//! the rest can be judged all the same.
 
-use core::ops::Range;
+mod twice;
 
-use super::judge::Finding;
-use super::unit::{is_unit, split_unit};
+use std::collections::BTreeMap;
 
-/// What a TOML reader says of a second key, or of a second section.
-const TWICE: &str = "duplicate key";
+use toml::de::DeTable;
 
-/// What is wrong at `span` of `text`, of which the reader says `message`.
-pub(super) fn explained(text: &str, span: &Range<usize>, message: &str) -> Finding {
-    let place = Place::at(text, span.start);
-    let other = || Finding {
-        key: place.key(),
-        cause: message.to_owned(),
-        help: "a line is `key = value`, `[section]`, or a comment after #".into(),
-    };
-    if message.starts_with(TWICE) {
-        let told = place.twice(text).or_else(|| place.key_and_section(text));
-        return told.unwrap_or_else(other);
-    }
-    place
-        .with_a_unit()
-        .or_else(|| place.without_quotes())
-        .unwrap_or_else(other)
+use super::diagnostic::{Diagnostic, shown};
+use super::lines::below;
+use super::slips::{self, End, Slip, goes_on, is_toml};
+
+/// So many lines are told one by one; a file with more is hardly a configuration.
+const TOLD_MAX: usize = 25;
+
+/// What a text says besides what is no TOML in it.
+#[derive(Default)]
+pub(super) struct Recovered {
+    /// With as many lines, each in its place: as it was meant where that can be told, empty otherwise.
+    pub(super) text: String,
+    pub(super) findings: Vec<Diagnostic>,
+    /// Keys that are there and cannot be read.
+    pub(super) unread: Vec<String>,
+    /// Keys that are sections elsewhere, or the other way round: nothing more is said of them.
+    pub(super) contested: Vec<String>,
+    /// Lines whose value was taken for a text without quotes.
+    pub(super) taken_for_text: Vec<usize>,
 }
 
-/// A line of a file.
-struct Place<'a> {
-    /// Counted from 0.
-    number: usize,
-    line: &'a str,
-    /// The section that it is in; the line itself where that begins one.
-    section: &'a str,
-}
-
-impl<'a> Place<'a> {
-    fn at(text: &'a str, byte: usize) -> Self {
-        let before = text.get(..byte).unwrap_or(text);
-        let number = before.matches('\n').count();
-        let lines = || text.lines().take(number + 1).map(str::trim);
+impl Recovered {
+    /// Of a text that is TOML throughout.
+    pub(super) fn of(text: &str) -> Self {
         Self {
-            number,
-            section: lines()
-                .filter(|it| is_header(it))
-                .last()
-                .unwrap_or_default(),
-            line: lines().last().unwrap_or_default(),
+            text: text.to_owned(),
+            ..Self::default()
         }
     }
+}
 
-    /// The path of its key, as far as a line tells it.
-    fn key(&self) -> String {
-        let section = name_of(self.section);
-        match self.line.split_once('=') {
-            _ if is_header(self.line) => section.to_owned(),
-            Some((key, _)) if section.is_empty() => key.trim().to_owned(),
-            Some((key, _)) => format!("{section}.{}", key.trim()),
-            None => section.to_owned(),
+/// What can be read of `text`; `file` is its name in findings.
+pub(super) fn recovered(text: &str, file: &str) -> Recovered {
+    let mut found = Recovered::default();
+    let lines = text.split('\n');
+    let lines: Vec<&str> = lines
+        .map(|it| it.strip_suffix('\r').unwrap_or(it))
+        .collect();
+    let mut kept: Vec<String> = Vec::with_capacity(lines.len());
+    let mut section = Section::default();
+    let mut at = 0;
+    while let Some(line) = lines.get(at) {
+        let count = extent(&lines[at..]);
+        let whole = lines[at..at + count].join("\n");
+        match is_toml(&whole) {
+            true => {
+                section.enter(line);
+                kept.extend(lines[at..at + count].iter().map(|it| (*it).to_owned()));
+            }
+            false => {
+                let slip = slip(line, &whole, count);
+                section.enter(slip.meant.as_deref().unwrap_or_default());
+                let key = section.key(line);
+                if slip.meant.is_none() && !key.is_empty() {
+                    found.unread.push(key.clone());
+                }
+                if slip.is_text {
+                    found.taken_for_text.push(at + 1);
+                }
+                found.findings.push(Diagnostic {
+                    file: file.to_owned(),
+                    line: at + 1,
+                    column: line[..slip.at.min(line.len())].chars().count() + 1,
+                    key,
+                    cause: slip.cause,
+                    help: slip.help,
+                });
+                kept.push(slip.meant.unwrap_or_default());
+                kept.extend((1..count).map(|_| String::new()));
+            }
         }
+        at += count;
     }
+    twice::take_out(&mut kept, file, &mut found);
+    found.text = kept.join("\n");
+    found.findings.sort_by_key(|it| (it.line, it.column));
+    abridge(&mut found.findings);
+    found
+}
 
-    /// What it says, without a comment.
-    fn value(&self) -> Option<&'a str> {
-        let (_, value) = self.line.split_once('=')?;
-        Some(value.split('#').next().unwrap_or_default().trim())
-    }
-
-    /// `12.5 mm` in place of a number.
-    fn with_a_unit(&self) -> Option<Finding> {
-        let value = self.value()?;
-        let (number, unit) = split_unit(value)?;
-        let unit = unit.filter(|it| is_unit(it))?;
-        Some(Finding {
-            key: self.key(),
-            cause: format!("`{value}` is no number: the unit is in the key's name"),
-            help: format!("write {number} without `{unit}`, in the unit that the key ends with"),
-        })
-    }
-
-    /// A word that is no number and no `true` or `false`.
-    fn without_quotes(&self) -> Option<Finding> {
-        let value = self.value()?;
-        let is_word = value.starts_with(|it: char| it.is_alphabetic() || "/.~".contains(it));
-        if !is_word || value.contains('"') {
-            return None;
+/// How many of these lines the first of them goes on over.
+fn extent(lines: &[&str]) -> usize {
+    let Some(end) = goes_on(lines[0]) else {
+        return 1;
+    };
+    let mut whole = lines[0].to_owned();
+    for (at, line) in lines.iter().enumerate().skip(1) {
+        // A key or a section: what was begun was never ended.
+        if end == End::List && (begins(line) || is_header(line)) {
+            let is_said = |it: &&str| !(it.trim().is_empty() || it.trim_start().starts_with('#'));
+            let last = lines[1..at].iter().rposition(is_said);
+            return last.map_or(1, |it| it + 2);
         }
-        let key = self.key();
-        let told = |cause: String, help: String| Some(Finding { key, cause, help });
-        match value.to_lowercase().as_str() {
-            "true" | "yes" | "on" => told(
-                format!("`{value}` is not known here"),
-                "write true, in small letters".into(),
-            ),
-            "false" | "no" | "off" => told(
-                format!("`{value}` is not known here"),
-                "write false, in small letters".into(),
-            ),
-            _ => told(
-                format!("`{value}` is text without quotes"),
-                format!("write it in quotes: \"{value}\""),
-            ),
-        }
-    }
-
-    /// Where the same key, or the same section, stands before.
-    fn twice(&self, text: &str) -> Option<Finding> {
-        let is_section = is_header(self.line);
-        let wanted = match is_section {
-            true => name_of(self.line),
-            false => self.line.split_once('=')?.0.trim(),
+        whole = whole + "\n" + line;
+        let is_end = match end {
+            End::List => line.trim_start().starts_with(']'),
+            End::Table => line.trim_start().starts_with('}'),
+            End::Text => false,
         };
-        let mut section = "";
-        let mut first = None;
-        for (number, line) in text.lines().map(str::trim).enumerate().take(self.number) {
-            if is_header(line) {
-                section = line;
-                // Each section of a list is another one.
-                first = first.filter(|_| !(line.starts_with("[[") && line == self.section));
-            }
-            let seen = match (is_section, line.split_once('=')) {
-                (true, _) if is_header(line) => name_of(line),
-                (false, Some((key, _))) if section == self.section => key.trim(),
-                _ => continue,
-            };
-            if seen == wanted && first.is_none() {
-                first = Some(number + 1);
-            }
+        if is_end || is_toml(&whole) {
+            return at + 1;
         }
-        let what = if is_section { "the section" } else { "the key" };
-        Some(Finding {
-            key: self.key(),
-            cause: format!(
-                "{what} stands here a second time; line {} has it first",
-                first?
-            ),
-            help: "leave one of them out".into(),
-        })
+    }
+    1
+}
+
+/// Whether a key stands at the beginning of the line.
+fn begins(line: &str) -> bool {
+    let is_letter = |it: char| it.is_ascii_alphanumeric() || "_-".contains(it);
+    let key = line.split_once('=').map(|it| it.0.trim());
+    key.is_some_and(|it| !it.is_empty() && it.chars().all(is_letter))
+}
+
+/// What is wrong with a line, or with what goes on over `count` lines.
+fn slip(line: &str, whole: &str, count: usize) -> Slip {
+    let place = DeTable::parse(whole).err().and_then(|it| it.span());
+    let at = place.map_or(0, |it| it.start);
+    match goes_on(line) {
+        Some(end) => slips::of_lines(line, whole, end, count),
+        None => slips::of_line(line, at),
+    }
+}
+
+/// Of a file without a line that is right, one finding says it.
+fn abridge(findings: &mut Vec<Diagnostic>) {
+    let more = findings.len().saturating_sub(TOLD_MAX);
+    if more > 0 {
+        findings.truncate(TOLD_MAX);
+        if let Some(last) = findings.last_mut() {
+            last.help +=
+                &format!("; {more} more places below it are no TOML: is this a configuration?");
+        }
+    }
+}
+
+/// The section that a line stands in, as findings name it.
+#[derive(Default)]
+struct Section {
+    path: String,
+    /// How often each section of a list was seen.
+    seen: BTreeMap<String, usize>,
+}
+
+impl Section {
+    fn enter(&mut self, line: &str) {
+        let line = line.trim();
+        if !is_header(line) {
+            return;
+        }
+        let name = name_of(line);
+        self.path = match line.starts_with("[[") {
+            true => {
+                let count = self.seen.entry(name.to_owned()).or_default();
+                *count += 1;
+                format!("{name}.{}", *count - 1)
+            }
+            false => self.within(name),
+        };
     }
 
-    /// Where a key has the name that a section has here, or the other way round.
-    fn key_and_section(&self, text: &str) -> Option<Finding> {
-        let here = self.key();
-        let mut section = "";
-        let mut before = text.lines().map(str::trim).take(self.number);
-        let first = before.position(|line| {
-            if is_header(line) {
-                section = name_of(line);
-                return !is_header(self.line) && section == here;
-            }
-            let key = line.split_once('=').map(|it| it.0.trim());
-            is_header(self.line) && key.is_some_and(|it| here == format!("{section}.{it}"))
-        })?;
-        let [what, other] = match is_header(self.line) {
-            true => ["section", "key"],
-            false => ["key", "section"],
-        };
-        Some(Finding {
-            key: here,
-            cause: format!("it is a {what} here, and a {other} on line {}", first + 1),
-            help: format!("one of them has the wrong name: correct the {other} or the {what}"),
-        })
+    /// `[platform.actuator.strokes]` is of the last `[[platform.actuator]]`.
+    fn within(&self, name: &str) -> String {
+        let lists = self.seen.iter().rev();
+        let mut inner = lists.filter_map(|(list, count)| {
+            let rest = name.strip_prefix(list.as_str())?.strip_prefix('.')?;
+            Some(format!("{list}.{}.{rest}", count - 1))
+        });
+        inner.next().unwrap_or_else(|| name.to_owned())
+    }
+
+    /// The path of the key of `line`, as far as the line tells it.
+    fn key(&self, line: &str) -> String {
+        let line = line.split(" #").next().unwrap_or_default().trim();
+        let (key, _) = line.split_once('=').unwrap_or_else(|| {
+            let end = line.find([':', ' ']).unwrap_or(line.len());
+            (&line[..end], "")
+        });
+        let key = key.trim().trim_end_matches([':', '-', '=']).trim_end();
+        let is_letter = |it: char| it.is_alphanumeric() || "_- ".contains(it);
+        match key.is_empty() || !key.chars().all(is_letter) {
+            true => self.path.clone(),
+            false => below(&self.path, &shown(key)),
+        }
     }
 }
 
 /// `[axis.x]`, and no line of a list over several lines.
 fn is_header(line: &str) -> bool {
+    let line = line.trim();
     let name = name_of(line);
     let is_name = |it: char| it.is_alphanumeric() || "_.-\"' ".contains(it);
     let is_list = name.starts_with(|it: char| it.is_ascii_digit() || it == '-');
@@ -179,115 +209,4 @@ fn name_of(header: &str) -> &str {
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::Edit;
-    use crate::config::{ConfigError, parse};
-
-    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
-
-    #[track_caller]
-    fn check(from: &str, to: &str, key: &str, says: [&str; 2]) {
-        let found = match parse(&LINEAR.edit_first(from, to), "m.toml") {
-            Err(ConfigError::Invalid { findings }) => findings,
-            other => panic!("{other:?}"),
-        };
-        let [one] = &found[..] else {
-            panic!("{found:#?}")
-        };
-        assert_eq!(one.key, key);
-        assert!(one.cause.contains(says[0]), "{one}");
-        assert!(one.help.contains(says[1]), "{one}");
-    }
-
-    #[test]
-    fn a_number_with_a_unit_says_how_it_is_written() {
-        let says = ["`0.2 mm` is no number", "write 0.2 without `mm`"];
-        let from = "standard_uncertainty_limit_um = 0.2";
-        let key = "axis.x.zero.standard_uncertainty_limit_um";
-        check(from, "standard_uncertainty_limit_um = 0.2 mm", key, says);
-        let says = ["`200mm/s` is no number", "write 200 without `mm/s`"];
-        let (from, key) = ("speed_mm_per_s = 200.0", "axis.x.speed_mm_per_s");
-        check(from, "speed_mm_per_s = 200mm/s    # fast", key, says);
-    }
-
-    #[test]
-    fn text_without_quotes_is_shown_in_them() {
-        let says = ["`slcan` is text without quotes", "\"slcan\""];
-        let (from, key) = ("transport = \"slcan\"", "can.can0.transport");
-        check(from, "transport = slcan", key, says);
-        let says = ["`/dev/ttyACM0`", "\"/dev/ttyACM0\""];
-        check(
-            "path = \"/dev/ttyACM0\"",
-            "path = /dev/ttyACM0",
-            "serial.laser.path",
-            says,
-        );
-    }
-
-    #[test]
-    fn what_stands_there_twice_is_named_with_both_places() {
-        let first = LINEAR.lines().position(|it| it.starts_with("node_id = 1"));
-        let line = format!("line {} has it first", first.expect("it is there") + 1);
-        let (key, says) = ("axis.x.node_id", [line.as_str(), "leave one"]);
-        check("node_id = 1\n", "node_id = 1\nnode_id = 2\n", key, says);
-        let says = ["the section stands here a second time", "leave one"];
-        check(
-            "[axis.x.verify]",
-            "[axis.x.calibrate]\n[axis.x.verify]",
-            "axis.x.calibrate",
-            says,
-        );
-    }
-
-    #[test]
-    fn a_key_that_is_called_like_a_section_is_named_with_both_places() {
-        let header = LINEAR.lines().position(|it| it == "[axis.x]");
-        let header = header.expect("it is there") + 1;
-        let says = format!("a section here, and a key on line {}", header + 1);
-        let to = "[axis.x]\nzero = 400.0\n";
-        check("[axis.x]\n", to, "axis.x.zero", [&says, "wrong name"]);
-        let says = format!("a key here, and a section on line {header}");
-        let to = "[axis.x.soft]\n[axis.x]\nsoft = 3\n";
-        check("[axis.x]\n", to, "axis.x.soft", [&says, "wrong name"]);
-    }
-
-    #[test]
-    fn a_number_or_a_word_that_is_nearly_right_is_told_as_what_it_is() {
-        let (from, key) = ("correct_air = true", "instrument.laser.correct_air");
-        check(from, "correct_air = True", key, ["`True`", "write true"]);
-        check(from, "correct_air = off", key, ["`off`", "write false"]);
-        let from = "device_type = 0x00020192";
-        let key = "axis.x.identity.device_type";
-        check(from, "device_type = 0x0002019G", key, ["", "`key = value`"]);
-    }
-
-    #[test]
-    fn in_a_list_of_sections_the_same_section_is_searched() {
-        const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
-        let third = UVW.rfind("lead_mm").expect("it is there");
-        let text = format!("{}lead_mm = 2.0\n{}", &UVW[..third], &UVW[third..]);
-        let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
-            panic!("it stands there twice")
-        };
-        let first = text[..third].matches('\n').count() + 1;
-        assert!(
-            findings[0]
-                .cause
-                .contains(&format!("line {first} has it first")),
-            "{findings:?}"
-        );
-    }
-
-    #[test]
-    fn a_list_over_several_lines_is_no_section() {
-        let from = "channels = [0, 1] ";
-        let to = "channels = [\n  0,\n  1\n]\nnoise = [\n  [1.0, 2.0],\n]\nx = 5 mm #";
-        check(from, to, "analog.hall.x", ["`5 mm`", "write 5"]);
-    }
-
-    #[test]
-    fn anything_else_says_what_a_line_is() {
-        let says = ["", "`key = value`"];
-        check("node_id = 1\n", "node_id 1\n", "axis.x", says);
-    }
-}
+mod tests;

@@ -1,5 +1,8 @@
 //! What is doubtful of a configuration that is sound: nothing of it is refused, all of it is told.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use super::judge::{Finding, Judge};
 use super::model::MachineConfig;
 use super::watch_warnings;
@@ -10,11 +13,28 @@ use crate::kinds::KINDS;
 pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
     let mut found = Vec::new();
     check_profiles(config, &mut found);
+    check_paths(config, &mut found);
     watch_warnings::check(config, &mut found);
     for kind in KINDS {
         (kind.warnings)(config, &mut found);
     }
     found
+}
+
+/// Whether each bus and line has a device of the computer to itself.
+fn check_paths(config: &MachineConfig, found: &mut Vec<Finding>) {
+    let buses = config.can.iter();
+    let buses = buses.filter_map(|(name, it)| Some((format!("can.{name}"), it.path.as_ref()?)));
+    let lines = config.serial.iter();
+    let lines = lines.map(|(name, it)| (format!("serial.{name}"), &it.path));
+    let mut taken: BTreeMap<&PathBuf, String> = BTreeMap::new();
+    for (key, path) in buses.chain(lines) {
+        if let Some(other) = taken.insert(path, key.clone()) {
+            let cause = format!("{} is that of {other} too", path.display());
+            let help = "give each the device that it is plugged into; `/dev/serial/by-id/` has their names";
+            Judge::at(key, found).say("path", cause, help);
+        }
+    }
 }
 
 /// The device profile that a drive has (0x1000, its low half: CiA 301).
@@ -91,6 +111,13 @@ mod tests {
         ] {
             check(text, &[], &[], "");
         }
+    }
+
+    #[test]
+    fn two_that_are_plugged_into_one_port_are_told() {
+        let edit = ("path = \"/dev/ttyACM0\"", "path = \"/dev/ttyACM1\"");
+        let says = "/dev/ttyACM1 is that of can.can0 too";
+        check(LINEAR, &[edit], &["serial.laser.path"], says);
     }
 
     #[test]

@@ -4,6 +4,8 @@ mod gantry;
 
 use units::Short;
 
+use compensator::hall_zero::SettingsError;
+
 use crate::assemble;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
@@ -178,10 +180,28 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
         && let Err(error) = assemble::hall_settings(zero, &axis.motion).validate()
     {
         judge.say(
-            "",
+            key_of(&error),
             error.to_string(),
             "vc is `level_below_peak_v`, vc0 is `turn_below_peak_v`",
         );
+    }
+}
+
+/// The key of the one setting that an error is about, if it is about one.
+fn key_of(error: &SettingsError) -> &'static str {
+    let setting = match error {
+        SettingsError::NotPositive { setting, .. } => setting,
+        SettingsError::BandTooNarrow { band, .. } => band,
+        SettingsError::Order { .. } | SettingsError::NominalOutside { .. } => "",
+    };
+    match setting {
+        "vc" => "level_below_peak_v",
+        "vc0" => "turn_below_peak_v",
+        "delta1" => "delta1_mv",
+        "delta2" => "delta2_mv",
+        "delta3" => "delta3_mv",
+        "delta4" => "delta4_mv",
+        _ => "",
     }
 }
 

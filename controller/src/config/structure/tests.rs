@@ -215,3 +215,69 @@ fn a_number_in_quotes_is_told_as_it_was_meant_or_not_at_all() {
     let says = ["expected a number", "without quotes and unit: 200"];
     check(LINEAR, from, "speed_mm_per_s = \"200 mm/s\"", key, says);
 }
+
+#[test]
+fn a_word_that_was_mistyped_is_told_with_the_one_that_was_meant() {
+    for seen in ["sclan", "SLCAN", "slcan "] {
+        let to = format!("transport = \"{seen}\"");
+        let says = ["is not known here", "did you mean \"slcan\"?"];
+        let from = "transport = \"slcan\"";
+        check(LINEAR, from, &to, "can.can0.transport", says);
+    }
+    let says = ["there is no CAN bus `cna0`", "did you mean `can0`?"];
+    check(
+        LINEAR,
+        "bus = \"can0\"",
+        "bus = \"cna0\"",
+        "axis.x.bus",
+        says,
+    );
+}
+
+#[test]
+fn a_key_that_stands_in_another_section_says_where_it_belongs() {
+    let from = "vendor_id = 0x000007FF";
+    let to = "vendor_id = 0x000007FF\nsynchronous_start = true";
+    let says = ["no such key here", "a key of [axis.x]: write it there"];
+    check(LINEAR, from, to, "axis.x.identity.synchronous_start", says);
+    let says = [
+        "no such key here",
+        "`plate` is a key of [rotary.NAME.calibrate]",
+    ];
+    let (from, to) = ("[serial.laser]", "[serial.laser]\nplate = \"x\"");
+    check(LINEAR, from, to, "serial.laser.plate", says);
+}
+
+#[test]
+fn a_section_of_one_axis_without_its_name_is_told_with_it() {
+    let says = ["says not of which", "write [axis.x.verify]"];
+    check(
+        LINEAR,
+        "[axis.x.verify]",
+        "[axis.verify]",
+        "axis.verify",
+        says,
+    );
+}
+
+#[test]
+fn a_part_of_a_section_whose_name_was_mistyped_is_told_alone() {
+    let says = ["no such key here", "did you mean `axis`?"];
+    check(LINEAR, "[axis.x]", "[axes.x]", "axes", says);
+}
+
+#[test]
+fn what_stands_between_keys_is_judged_beside_what_is_wrong_with_one() {
+    let text = LINEAR
+        .edit_first("speed_mm_per_s = 200.0", "speed_mm_per_s = \"200 mm/s\"")
+        .edit_first("soft_min_mm", "soft_mim_mm")
+        .edit_first("node_id = 2", "node_id = 1");
+    let found = findings(&text);
+    let keys: Vec<_> = found.iter().map(|it| it.key.as_str()).collect();
+    let expected = [
+        "axis.x.soft_mim_mm",
+        "axis.x.speed_mm_per_s",
+        "analog.hall.node_id",
+    ];
+    assert_eq!(keys, expected, "{found:#?}");
+}

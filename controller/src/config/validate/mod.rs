@@ -169,7 +169,13 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
                     let fits = period_from(shortest_period).unwrap_or(shortest_period);
                     format!("{} ms would fit", fits.as_nanos() as f64 / 1e6)
                 }
-                BusLoadError::NoRoom { .. } | BusLoadError::Senseless { .. } => String::new(),
+                BusLoadError::NoRoom { .. } => {
+                    "raise its bit rate, or its heartbeats' periods, or put fewer devices on it"
+                        .into()
+                }
+                BusLoadError::Senseless { .. } => {
+                    "give every period on this bus more than 0".into()
+                }
             };
             findings.push(Finding {
                 key: format!("can.{name}.sync_period_ms"),

@@ -1,0 +1,52 @@
+//! Where a key is at home that stands where it is not known.
+
+use serde_json::Value as Schema;
+
+use crate::config::lines::below;
+
+/// So many sections are named at most.
+const NAMED_MAX: usize = 3;
+
+/// The sections that have a key called `key`, as text; `None` where none has.
+pub(super) fn of(schema: &Schema, key: &str) -> Option<String> {
+    let mut found = Vec::new();
+    walk(schema, "", key, &mut found);
+    let named: Vec<_> = found
+        .iter()
+        .take(NAMED_MAX)
+        .map(|it| match it.is_empty() {
+            true => "the top of the file".to_owned(),
+            false => format!("[{it}]"),
+        })
+        .collect();
+    let more = match found.len() > NAMED_MAX {
+        true => " and others",
+        false => "",
+    };
+    (!named.is_empty()).then(|| format!("{}{more}", named.join(", ")))
+}
+
+fn walk(schema: &Schema, path: &str, key: &str, found: &mut Vec<String>) {
+    for (name, part) in schema["properties"].as_object().into_iter().flatten() {
+        if name == key && !found.iter().any(|it| it == path) {
+            found.push(path.to_owned());
+        }
+        walk(part, &below(path, name), key, found);
+    }
+    if schema["additionalProperties"].is_object() {
+        walk(
+            &schema["additionalProperties"],
+            &below(path, "NAME"),
+            key,
+            found,
+        );
+    }
+    if schema["items"].is_object() {
+        walk(&schema["items"], path, key, found);
+    }
+    for choices in ["oneOf", "anyOf"] {
+        for part in schema[choices].as_array().into_iter().flatten() {
+            walk(part, path, key, found);
+        }
+    }
+}

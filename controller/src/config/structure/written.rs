@@ -1,0 +1,105 @@
+//! Values of another type than was wanted: how they are written, and what was meant.
+
+use toml::Value;
+
+use crate::config::unit::{is_unit, split_unit};
+
+/// A value of another type as it was meant.
+pub(super) fn converted(expected: &str, value: &Value) -> Option<Value> {
+    match (expected, value) {
+        ("number", Value::String(text)) => {
+            let number = number_in(text)?.trim();
+            number.parse().ok().map(Value::Float)
+        }
+        ("integer", Value::String(text)) => {
+            number_in(text)?.trim().parse().ok().map(Value::Integer)
+        }
+        ("integer", Value::Float(it)) if it.fract() == 0.0 => Some(Value::Integer(*it as i64)),
+        ("boolean", Value::String(text)) => truth(text).map(Value::Boolean),
+        ("string", Value::Integer(_) | Value::Float(_)) => Some(Value::String(value.to_string())),
+        (_, Value::Array(items)) => match (&items[..], expected) {
+            ([Value::Float(it)], "number") => Some(Value::Float(*it)),
+            ([one @ Value::Integer(_)], "integer" | "number") => Some(one.clone()),
+            ([one @ Value::String(_)], "string") => Some(one.clone()),
+            ([one @ Value::Boolean(_)], "boolean") => Some(one.clone()),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// What a word of everyday says instead of `true` or `false`.
+fn truth(word: &str) -> Option<bool> {
+    match word.to_lowercase().as_str() {
+        "true" | "yes" | "on" => Some(true),
+        "false" | "no" | "off" => Some(false),
+        _ => None,
+    }
+}
+
+pub(super) fn in_words(expected: &str) -> &'static str {
+    match expected {
+        "object" => "a section",
+        "array" => "a list",
+        "number" => "a number",
+        "integer" => "a whole number",
+        "boolean" => "`true` or `false`",
+        _ => "text",
+    }
+}
+
+pub(super) const fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::String(_) => "text",
+        Value::Integer(_) => "a whole number",
+        Value::Float(_) => "a number",
+        Value::Boolean(_) => "`true` or `false`",
+        Value::Datetime(_) => "a date",
+        Value::Array(_) => "a list",
+        Value::Table(_) => "a section",
+    }
+}
+
+pub(super) fn correction(expected: &str, value: &Value) -> String {
+    match (expected, value) {
+        ("number" | "integer", Value::String(text)) => match number_in(text) {
+            Some(number) if number == text => format!("write it without quotes: {number}"),
+            Some(number) => {
+                format!("write it without quotes and unit: {number}; a key's ending is its unit")
+            }
+            None => format!("give {}", in_words(expected)),
+        },
+        ("boolean", Value::String(text)) => match truth(text) {
+            Some(it) => format!("write it without quotes: {it}"),
+            None => "give true or false".into(),
+        },
+        ("boolean", Value::Integer(it)) => match it {
+            0 => "write false".into(),
+            1 => "write true".into(),
+            _ => "give true or false".into(),
+        },
+        ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
+            format!("write it in quotes: \"{value}\"")
+        }
+        ("integer", Value::Float(it)) if it.is_finite() => format!("write {it:.0}"),
+        ("array", Value::Table(_)) => "write a list: [...]".into(),
+        ("array", _) => "write it in brackets: [...]".into(),
+        ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
+            [one] => format!("write it without brackets: {one}"),
+            _ => format!("give {} and no list", in_words(expected)),
+        },
+        ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),
+        _ => format!("give {}", in_words(expected)),
+    }
+}
+
+/// The number of a text that is one, with a unit or without.
+fn number_in(text: &str) -> Option<&str> {
+    let text = text.trim();
+    let digits = text.strip_prefix("0x").unwrap_or_default();
+    if !digits.is_empty() && digits.chars().all(|it| it.is_ascii_hexdigit() || it == '_') {
+        return Some(text);
+    }
+    let (number, unit) = split_unit(text)?;
+    unit.is_none_or(is_unit).then_some(number)
+}

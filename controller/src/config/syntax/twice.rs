@@ -1,0 +1,173 @@
+//! Keys and sections that stand in a text a second time, or one as the other.
+
+use toml::de::DeTable;
+
+use super::{Recovered, is_header, name_of};
+use crate::config::diagnostic::{Diagnostic, shown};
+use crate::config::lines::below;
+
+/// Tells each, and leaves it out of `lines`, each of which is TOML by itself.
+pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) {
+    // Each round leaves out one line at least.
+    for _ in 0..lines.len() {
+        let text = lines.join("\n");
+        let Err(error) = DeTable::parse(&text) else {
+            return;
+        };
+        let at = error.span().map_or(0, |it| it.start);
+        let before = text.get(..at).unwrap_or_default();
+        let number = before.matches('\n').count();
+        let column = before
+            .rsplit('\n')
+            .next()
+            .unwrap_or_default()
+            .chars()
+            .count()
+            + 1;
+        let place = Place::at(lines, number);
+        let (cause, help) = place.told();
+        found.contested.push(place.key());
+        found.findings.push(Diagnostic {
+            file: file.to_owned(),
+            line: number + 1,
+            column,
+            key: place.key(),
+            cause,
+            help,
+        });
+        let is_section = place.is_section();
+        leave_out(lines, number, is_section);
+    }
+}
+
+/// The line, and all of the section that it begins.
+fn leave_out(lines: &mut [String], number: usize, is_section: bool) {
+    for (at, line) in lines.iter_mut().enumerate().skip(number) {
+        if at > number && (!is_section || is_header(line)) {
+            return;
+        }
+        line.clear();
+    }
+}
+
+/// A line of a text.
+struct Place<'a> {
+    lines: &'a [String],
+    /// Counted from 0.
+    number: usize,
+    line: &'a str,
+    /// The section that it is in; the line itself where that begins one.
+    section: &'a str,
+}
+
+impl<'a> Place<'a> {
+    fn at(lines: &'a [String], number: usize) -> Self {
+        let until = &lines[..=number];
+        let section = until
+            .iter()
+            .rev()
+            .map(|it| it.trim())
+            .find(|it| is_header(it));
+        Self {
+            lines,
+            number,
+            line: lines[number].trim(),
+            section: section.unwrap_or_default(),
+        }
+    }
+
+    fn is_section(&self) -> bool {
+        is_header(self.line)
+    }
+
+    fn key(&self) -> String {
+        match self.line.split_once('=') {
+            Some((key, _)) if !self.is_section() => below(name_of(self.section), key.trim()),
+            _ => name_of(self.section).to_owned(),
+        }
+    }
+
+    /// What is wrong, and what to do.
+    fn told(&self) -> (String, String) {
+        let told = self.twice().or_else(|| self.key_and_section());
+        told.unwrap_or_else(|| {
+            let cause = format!("`{}` goes on with what has ended before", shown(self.line));
+            let help = "write all keys of a section below one line with its name in brackets";
+            (cause, help.into())
+        })
+    }
+
+    fn before(&self) -> impl Iterator<Item = &'a str> {
+        self.lines.iter().map(|it| it.trim()).take(self.number)
+    }
+
+    /// Where the same key, or the same section, stands before.
+    fn twice(&self) -> Option<(String, String)> {
+        let is_section = self.is_section();
+        let wanted = match is_section {
+            true => name_of(self.line),
+            false => self.line.split_once('=')?.0.trim(),
+        };
+        let mut section = "";
+        let mut first = None;
+        for (number, line) in self.before().enumerate() {
+            if is_header(line) {
+                section = line;
+                // Each section of a list is another one.
+                first = first.filter(|_| !(line.starts_with("[[") && line == self.section));
+            }
+            let seen = match (is_section, line.split_once('=')) {
+                (true, _) if is_header(line) => name_of(line),
+                (false, Some((key, _))) if section == self.section => key.trim(),
+                _ => continue,
+            };
+            if seen == wanted && first.is_none() {
+                first = Some((number + 1, line));
+            }
+        }
+        let (number, first) = first?;
+        let lists = [first, self.line].map(|it| it.starts_with("[["));
+        if is_section && lists[0] != lists[1] {
+            let cause = format!(
+                "`{}` stands here, and `{}` on line {number}",
+                shown(self.line),
+                shown(first)
+            );
+            let help =
+                "write both alike: [[...]] where there can be several, [...] where there is one";
+            return Some((cause, help.into()));
+        }
+        let what = if is_section { "the section" } else { "the key" };
+        let cause = format!("{what} stands here a second time; line {number} has it first");
+        Some((cause, "leave one of them out".into()))
+    }
+
+    /// Where a key has the name that a section has here, or the other way round.
+    fn key_and_section(&self) -> Option<(String, String)> {
+        let here = self.key();
+        let is_section = self.is_section();
+        let own = name_of(self.section);
+        let is_in =
+            |inner: &str, outer: &str| inner == outer || inner.starts_with(&format!("{outer}."));
+        let mut section = "";
+        let first = self.before().position(|line| {
+            if is_header(line) {
+                section = name_of(line);
+                return !is_section && section.len() > own.len() && is_in(&here, section);
+            }
+            let Some((key, _)) = line.split_once('=') else {
+                return false;
+            };
+            let key = below(section, key.trim());
+            is_section && (is_in(&here, &key) || is_in(&key, &here))
+        })?;
+        let [what, other] = match is_section {
+            true => ["section", "key"],
+            false => ["key", "section"],
+        };
+        Some((
+            format!("it is a {what} here, and a {other} on line {}", first + 1),
+            format!("one of them has the wrong name: correct the {other} or the {what}"),
+        ))
+    }
+}
