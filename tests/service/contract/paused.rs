@@ -64,6 +64,8 @@ impl Bed<'_> {
     fn reset_and_zero(&self) {
         if self.client.machine().state == MachineState::ErrorStop {
             self.client.reset(&anna()).unwrap();
+        }
+        if !self.client.axis("x").unwrap().homed {
             self.client.zero(&anna(), None);
         }
     }
@@ -150,6 +152,7 @@ fn a_run_that_somebody_stopped_goes_on_with_what_it_measured() {
             bed.client.stop(&bert(), mode).unwrap();
             let (left, kept) = bed.has_left(&id, RunState::Stopped);
             assert_eq!(left.stopped.as_ref().unwrap().by, "bert");
+            bed.reset_and_zero();
             bed.goes_on(&left, kept);
         };
         each_here(new, zeroed(body));
