@@ -375,7 +375,7 @@ mod tests {
             "analog = \"hall\"",
             "analog = \"hull\"",
             10,
-            ["no analog module `hull`", "known: hall"],
+            ["no analog module `hull`", "Known: hall"],
         ),
         (", within_s = 2.0", "", 10, ["how long", "within_s"]),
         ("above_v = 1.0, ", "", 10, ["at which voltage", "above_v"]),
