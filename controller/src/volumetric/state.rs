@@ -191,6 +191,7 @@ impl WorkVolume<'_> {
                     what: "a drive of the three axes",
                     expected: text(expected),
                     seen: text(seen),
+                    instead: None,
                 });
             }
         }

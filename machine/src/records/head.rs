@@ -83,6 +83,7 @@ impl RecordHead {
                     what,
                     expected,
                     seen,
+                    instead: None,
                 });
             }
         }
