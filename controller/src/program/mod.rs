@@ -33,6 +33,7 @@ mod operator;
 mod output;
 mod page;
 mod platform;
+mod plausible;
 mod progress;
 mod refused;
 mod report;
