@@ -32,6 +32,7 @@ mod new;
 mod operator;
 mod output;
 mod page;
+mod paint;
 mod platform;
 mod plausible;
 mod progress;
@@ -69,7 +70,7 @@ use wire::lockstep::path_of;
 use crate::ports::Pace;
 use crate::{Agreed, Failure, made_by};
 use intended::Intent;
-use output::{Ended, Output};
+use output::{Ended, Output, Said};
 use refused::not_understood;
 use rotary::readings::ReadingsArgs;
 use schema::verb_of;
@@ -87,8 +88,24 @@ struct Cli {
     /// Print one JSON object on stdout instead of text.
     #[arg(long, global = true)]
     json: bool,
+    /// Say nothing on standard error but errors and questions.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on standard error, too, what is read, opened and written.
+    #[arg(long, short, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
+}
+
+impl Cli {
+    const fn said(&self) -> Said {
+        match (self.quiet, self.verbose) {
+            (true, _) => Said::Least,
+            (_, true) => Said::Most,
+            _ => Said::Usual,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -431,11 +448,11 @@ pub fn main(
         Err(refused) => return not_understood(&refused),
     };
     // As long as the program: there is one.
-    let output = Output::new(cli.json, verb.leak());
+    let output = Output::new(cli.json, verb.leak()).saying(cli.said());
     match done(cli.command, output, keep, enrol) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(failure)) => {
-            output.note(&format!("error: {failure}"));
+            output.must_say(&format!("error: {failure}"));
             ExitCode::from(failure.exit_code())
         }
         Err(failure) => {
