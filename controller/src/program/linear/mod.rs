@@ -4,7 +4,7 @@ mod compare;
 pub(crate) mod demo;
 pub(crate) mod elsewhere;
 mod gantry;
-mod intended;
+pub(super) mod intended;
 pub(crate) mod job;
 mod moved;
 mod page;
