@@ -314,11 +314,8 @@ fn a_jog_is_said_and_asked_for_before_anything_moves() {
         &["jog", "y=1mm/s"],
         &[("zero", "platform"), ("jog", "y")],
     );
-    check(
-        VOLUMETRIC,
-        &["jog", "y=1mm/s"],
-        &[("zero", "y"), ("jog", "y")],
-    );
+    let all = ("zero", "x, y, z");
+    check(VOLUMETRIC, &["jog", "y=1mm/s"], &[all, ("jog", "y")]);
     let folder = without_adapter();
     let (seen, code) = at_a_terminal(folder.path(), &jog, "n\n");
     check_says(

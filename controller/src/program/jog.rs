@@ -10,13 +10,14 @@ use units::text::axis_speed;
 use crate::config::{self, Loaded};
 use crate::program::before::said;
 use crate::program::intended::{Intent, Step, nowhere};
-use crate::program::jogs::{Jog, Jogs};
+use crate::program::jogs::Jog;
 use crate::program::json::counters;
 use crate::program::kept::or_by_its_service;
 use crate::program::kind::by_kind;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::Session;
 use crate::program::span::span_of;
+use crate::program::verbs::Verbs;
 use crate::program::{AskArgs, AxisArgs, MachineArgs, ZeroArgs};
 use crate::{Failure, Machine};
 
@@ -74,21 +75,21 @@ fn speed_of_axis(text: &str) -> Result<(String, AxisSpeed), Failure> {
 
 /// What the jog will do; refuses what makes no sense.
 fn steps(
-    jogs: &Jogs,
+    kind: &Verbs,
     loaded: &Loaded,
     (args, jog): (&JogArgs, &Jog),
 ) -> Result<Vec<Step>, Failure> {
-    (jogs.check)(&mut nowhere::machine(loaded), jog)?;
+    (kind.jog.check)(&mut nowhere::machine(loaded), jog)?;
     let zero = ZeroArgs {
         axis: AxisArgs {
             machine: args.machine.clone(),
-            axis: jogs.zeroed.is_none().then(|| jog.axis.clone()),
+            axis: kind.jog.zeroed.is_none().then(|| jog.axis.clone()),
         },
         ask: args.ask,
     };
     let store = loaded.config.machine.store();
-    let mut steps = (jogs.intended)(loaded, &store, Intent::Zero(&zero))?;
-    steps.push(jogs.step(jog));
+    let mut steps = (kind.intended)(loaded, &store, Intent::Zero(&zero))?;
+    steps.push(kind.jog.step(jog));
     Ok(steps)
 }
 
@@ -103,7 +104,7 @@ fn here(args: &JogArgs, output: Output) -> Ended {
     by_kind(&args.machine, [jog.axis.as_str()].into_iter(), |kind| {
         let loaded = config::load(&args.machine.config)?;
         loaded.filled_in()?;
-        let steps = steps(&kind.jog, &loaded, (args, &jog))?;
+        let steps = steps(kind, &loaded, (args, &jog))?;
         if let Some(ended) = said(&loaded, &steps, (args.ask, true), output)? {
             return ended;
         }

@@ -6,11 +6,9 @@ use machine::records::Store;
 use serde_json::{Value, json};
 use units::{AxisSpeed, LengthOrAngle, Metres, Radians, ShortSpan};
 
-use crate::config::Loaded;
 use crate::jogging::{Jogged, along};
 use crate::ports::Use;
-use crate::program::intended::{Intent, Step};
-use crate::program::linear;
+use crate::program::intended::Step;
 use crate::{Failure, Machine};
 
 /// What was asked for.
@@ -55,8 +53,6 @@ fn check_of_linear_axis(machine: &mut Machine, jog: &Jog) -> Result<(), Failure>
 pub(crate) struct Jogs {
     /// Refuses what makes no sense; the machine is not asked.
     pub(crate) check: fn(&mut Machine, &Jog) -> Result<(), Failure>,
-    /// What finding its zero does.
-    pub(crate) intended: fn(&Loaded, &Store, Intent<'_>) -> Result<Vec<Step>, Failure>,
     /// Starts the machine, finds the zero, and jogs.
     pub(crate) run: fn(&mut Machine, &Store, &Jog) -> Result<Jogged, Failure>,
     /// What the machine is opened for: what the zero needs.
@@ -73,7 +69,6 @@ impl Jogs {
     /// Of a linear axis, whatever else its machine is.
     pub(crate) const OF_A_LINEAR_AXIS: Self = Self {
         check: check_of_linear_axis,
-        intended: linear::intended::intended,
         run: of_linear_axis,
         purpose: Use::Motion,
         zeroed: None,

@@ -4,7 +4,7 @@ mod compare;
 pub(crate) mod demo;
 pub(crate) mod elsewhere;
 mod gantry;
-pub(super) mod intended;
+mod intended;
 pub(crate) mod job;
 mod moved;
 mod page;

@@ -41,7 +41,6 @@ pub(crate) const VERBS: Verbs = Verbs {
     move_to: verbs::move_to,
     jog: Jogs {
         check: verbs::check_jog,
-        intended: intended::intended,
         run: verbs::jog,
         purpose: Use::Measurement,
         zeroed: Some(PLATFORM),
