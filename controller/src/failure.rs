@@ -275,13 +275,13 @@ pub enum Failure {
         /// The calibration that is used again.
         in_use: Option<String>,
     },
-    /// A calibration that was just made is no better than what was before; it is not used any more.
+    /// A calibration that was just made is worse than what was before; it is not used any more.
     #[error(
-        "axis {axis}: THE NEW CALIBRATION {calibration} IS NO BETTER than what was before: A = {:.3} µm with it (tolerance \
+        "axis {axis}: THE NEW CALIBRATION {calibration} IS WORSE than what was before: A = {:.3} µm with it (tolerance \
          {:.3} µm), {:.3} µm {was}; {cause}. It was taken out of use; {}",
         seen.um(), limit.um(), before.um(), in_use_text(in_use.as_deref())
     )]
-    NotBetter {
+    NewIsWorse {
         /// Which axis.
         axis: String,
         /// The calibration, shortened.

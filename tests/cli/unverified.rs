@@ -132,7 +132,7 @@ fn shaken(bench: &Bench) -> Value {
 
 /// What was in use before was better, and is in use again; so the stage is corrected as well as it was.
 #[test]
-fn a_new_calibration_that_is_no_better_gives_way_to_the_one_before_with_a_service_and_without() {
+fn a_new_calibration_that_is_worse_gives_way_to_the_one_before_with_a_service_and_without() {
     for rig in live_rigs() {
         for is_kept in [false, true] {
             let bench = Bench::new(rig);
@@ -146,7 +146,7 @@ fn a_new_calibration_that_is_no_better_gives_way_to_the_one_before_with_a_servic
             assert_eq!(verification["stored"][0]["in_use"], false, "{told:#}");
             let error = text(&told["error"]);
             for part in [
-                "NO BETTER",
+                "IS WORSE than what was before",
                 "its runs scatter",
                 "used before, is in use again",
             ] {

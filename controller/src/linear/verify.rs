@@ -24,6 +24,9 @@ use machine::records::read_journal;
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
 const SCALE_LIMIT_PPM: f64 = 1000.0;
 
+/// A of one and the same axis differs by less from one verification to the next, when nothing is wrong.
+const CLEARLY: f64 = 1.25;
+
 /// How a verification is made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VerifyOptions {
@@ -87,7 +90,7 @@ impl LinearStage<'_> {
     /// Measures the axis at the configuration's verification targets and evaluates ISO 230-2.
     /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
     /// than without the calibration is one, and takes the calibration out of use. So is the first
-    /// verification of one that was just made, when that is out of tolerance and no better than the axis was before.
+    /// verification of one that was just made, when that is out of tolerance and clearly worse than the axis was before.
     ///
     /// # Errors
     /// When the axis is not zeroed or anything stops the machine.
@@ -183,8 +186,8 @@ impl LinearStage<'_> {
         })
     }
 
-    /// A calibration that was just made stays in use when its first verification is within tolerance, or shows it better
-    /// than what was before; of one that has proved itself a bad day is no reason to go back.
+    /// A calibration that was just made stays in use when its first verification is within tolerance, or not clearly
+    /// worse than what was before; of one that has proved itself a bad day is no reason to go back.
     fn judge_new(
         &mut self,
         store: &Store,
@@ -199,7 +202,8 @@ impl LinearStage<'_> {
         if verified.is_within_tolerance() {
             return Ok(());
         }
-        let Some(before) = before(store, self.axis, &made)?.filter(|it| it.accuracy < seen) else {
+        let before = before(store, self.axis, &made)?;
+        let Some(before) = before.filter(|it| it.accuracy * CLEARLY < seen) else {
             return Ok(());
         };
         let cause = match self.compensation() {
@@ -213,7 +217,7 @@ impl LinearStage<'_> {
             ),
         };
         let in_use = self.fall_back(store, calibration)?;
-        Err(Failure::NotBetter {
+        Err(Failure::NewIsWorse {
             axis: self.axis.to_owned(),
             calibration: short(&made.id),
             seen,

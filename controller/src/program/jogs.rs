@@ -89,7 +89,7 @@ impl Jogs {
             None => "until Ctrl-C, ".to_owned(),
         };
         let text = format!(
-            "at {speed} {unit} {until}and no longer than until it is {}; NOT CORRECTED: as far as {} counts",
+            "at {speed} {unit} {until}and no longer than until it is {}; NOT CORRECTED: by {} alone",
             self.end.0, self.by
         );
         Step::new("jog", &jog.axis, text)

@@ -62,7 +62,7 @@ pub(crate) enum Cut {
     /// Somebody stopped it; where what it measured is kept.
     Stopped(Option<PathBuf>),
     Failed,
-    /// It shows that the machine is worse with the calibration, or no better.
+    /// It shows that the machine is worse with the calibration.
     Worse,
 }
 
@@ -107,9 +107,7 @@ impl Made {
         told.text += match cut {
             Cut::Stopped(_) => "\nNOT VERIFIED: its verification was stopped",
             Cut::Failed => "\nNOT VERIFIED: its verification failed",
-            Cut::Worse => {
-                "\nNOT GOOD: its verification shows that the machine is no better with it"
-            }
+            Cut::Worse => "\nNOT GOOD: its verification shows that the machine is worse with it",
         };
         let mut stored = Vec::new();
         for ((pointer, id), is_used) in self.stored.iter().zip(used) {
