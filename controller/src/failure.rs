@@ -16,7 +16,7 @@ use units::{Metres, Radians};
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
-use crate::linear::{PatternFinding, SamplesLost};
+use crate::linear::{NewIsWorse, PatternFinding, SamplesLost};
 use crate::store::StoreError;
 
 use of_kind::{KindFailure, OfKind};
@@ -276,29 +276,8 @@ pub enum Failure {
         in_use: Option<String>,
     },
     /// A calibration that was just made is worse than what was before; it is not used any more.
-    #[error(
-        "axis {axis}: THE NEW CALIBRATION {calibration} IS WORSE than what was before: A = {:.3} µm with it (tolerance \
-         {:.3} µm), {:.3} µm {was}; {cause}. It was taken out of use; {}",
-        seen.um(), limit.um(), before.um(), in_use_text(in_use.as_deref())
-    )]
-    NewIsWorse {
-        /// Which axis.
-        axis: String,
-        /// The calibration, shortened.
-        calibration: String,
-        /// The bidirectional accuracy with it.
-        seen: Metres,
-        /// The tolerance of the configuration.
-        limit: Metres,
-        /// The bidirectional accuracy before.
-        before: Metres,
-        /// With what that was, in words.
-        was: String,
-        /// What probably is wrong.
-        cause: String,
-        /// The calibration that is used again.
-        in_use: Option<String>,
-    },
+    #[error(transparent)]
+    NewIsWorse(Box<NewIsWorse>),
     /// The same place measured at the beginning and the end differs too much.
     #[error(
         "axis {axis}: closure error {:.3} µm, the limit is {:.3} µm; thermal drift or a loose \

@@ -91,7 +91,7 @@ fn optics(failure: &Failure) -> bool {
             | Failure::StandsOff { .. }
             | Failure::Correction { .. }
             | Failure::MadeWorse { .. }
-            | Failure::NewIsWorse { .. }
+            | Failure::NewIsWorse(_)
             | Failure::Compensation { .. }
     )
 }

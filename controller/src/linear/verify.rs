@@ -7,10 +7,11 @@ use compensator::error_table::{Compensation, ErrorTable};
 use compensator::iso230::{self, Figures};
 use units::{Approach, Metres};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, in_use_text};
 use crate::linear::calibrate::open_journal;
 use crate::linear::measure::{MeasureOptions, Measured, series_of};
 use crate::linear::memory::Untried;
+use crate::linear::on_trial::NewIsWorse;
 use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
@@ -217,7 +218,7 @@ impl LinearStage<'_> {
             ),
         };
         let in_use = self.fall_back(store, calibration)?;
-        Err(Failure::NewIsWorse {
+        Err(Failure::NewIsWorse(Box::new(NewIsWorse {
             axis: self.axis.to_owned(),
             calibration: short(&made.id),
             seen,
@@ -225,8 +226,8 @@ impl LinearStage<'_> {
             before: before.accuracy,
             was: before.what,
             cause,
-            in_use: in_use.as_deref().map(short),
-        })
+            then: in_use_text(in_use.as_deref().map(short).as_deref()),
+        })))
     }
 
     /// Goes back to the newest calibration before `calibration` that fits this machine, or to

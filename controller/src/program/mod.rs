@@ -70,7 +70,7 @@ use wire::lockstep::path_of;
 use crate::ports::Pace;
 use crate::{Agreed, Failure, made_by};
 use intended::Intent;
-use output::{Ended, Output, Said};
+use output::{Ended, Output, SaidArgs};
 use refused::not_understood;
 use rotary::readings::ReadingsArgs;
 use schema::verb_of;
@@ -88,24 +88,10 @@ struct Cli {
     /// Print one JSON object on stdout instead of text.
     #[arg(long, global = true)]
     json: bool,
-    /// Say nothing on standard error but errors and questions.
-    #[arg(long, short, global = true, conflicts_with = "verbose")]
-    quiet: bool,
-    /// Say on standard error, too, what is read, opened and written.
-    #[arg(long, short, global = true)]
-    verbose: bool,
+    #[command(flatten)]
+    said: SaidArgs,
     #[command(subcommand)]
     command: Command,
-}
-
-impl Cli {
-    const fn said(&self) -> Said {
-        match (self.quiet, self.verbose) {
-            (true, _) => Said::Least,
-            (_, true) => Said::Most,
-            _ => Said::Usual,
-        }
-    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -448,7 +434,7 @@ pub fn main(
         Err(refused) => return not_understood(&refused),
     };
     // As long as the program: there is one.
-    let output = Output::new(cli.json, verb.leak()).saying(cli.said());
+    let output = Output::new(cli.json, verb.leak()).saying(cli.said.said());
     match done(cli.command, output, keep, enrol) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(failure)) => {

@@ -39,6 +39,27 @@ pub(crate) enum Said {
     Most,
 }
 
+/// The words of the command line for it.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(crate) struct SaidArgs {
+    /// Say nothing on standard error but errors and questions.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on standard error, too, what is read, opened and written.
+    #[arg(long, short, global = true)]
+    verbose: bool,
+}
+
+impl SaidArgs {
+    pub(crate) const fn said(self) -> Said {
+        match (self.quiet, self.verbose) {
+            (true, _) => Said::Least,
+            (_, true) => Said::Most,
+            _ => Said::Usual,
+        }
+    }
+}
+
 /// How results are printed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
