@@ -23,7 +23,7 @@ pub(super) fn head_of(loaded: &Loaded, store: &Store, id: &str) -> Result<Record
             what,
             expected,
             seen,
-            instead: newest_that_belongs(loaded, store, &head.axis),
+            instead: newest_that_belongs(loaded, store, &head.axis).map(Into::into),
         },
         other => other,
     })?;

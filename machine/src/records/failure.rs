@@ -79,11 +79,11 @@ pub enum StoreError {
         /// What differs.
         what: &'static str,
         /// What the calibration says.
-        expected: String,
+        expected: Box<str>,
         /// What this machine is.
-        seen: String,
+        seen: Box<str>,
         /// The newest calibration that would fit, if it is known that there is one.
-        instead: Option<String>,
+        instead: Option<Box<str>>,
     },
     /// The calibration holds another kind of model than is needed.
     #[error(

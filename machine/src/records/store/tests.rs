@@ -144,9 +144,9 @@ fn hashes_that_differ_are_told_by_their_beginnings_with_what_to_do() {
         let error = StoreError::Foreign {
             id: "id".into(),
             what: "the configuration's hash",
-            expected: hash("a"),
-            seen: hash("b"),
-            instead,
+            expected: hash("a").into(),
+            seen: hash("b").into(),
+            instead: instead.map(Into::into),
         };
         error.to_string()
     };
