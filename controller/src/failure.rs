@@ -16,7 +16,7 @@ use units::{Metres, Radians};
 use crate::config::{ConfigError, Count};
 #[cfg(feature = "emulator")]
 use crate::emulated::EmulatedError;
-use crate::linear::{PatternFinding, SamplesLost};
+use crate::linear::{NewIsWorse, PatternFinding, SamplesLost};
 use crate::store::StoreError;
 
 use of_kind::{KindFailure, OfKind};
@@ -275,6 +275,9 @@ pub enum Failure {
         /// The calibration that is used again.
         in_use: Option<String>,
     },
+    /// A calibration that was just made is worse than what was before; it is not used any more.
+    #[error(transparent)]
+    NewIsWorse(Box<NewIsWorse>),
     /// The same place measured at the beginning and the end differs too much.
     #[error(
         "axis {axis}: closure error {:.3} µm, the limit is {:.3} µm; thermal drift or a loose \

@@ -2,10 +2,17 @@
 
 use std::fs;
 
-use machine::records::Lease;
+use machine::records::{CalibrationRecord, Lease};
 use tests::LINEAR;
+use truestage::linear::LinearContent;
 
 use crate::programs::{check_error, text, truestage};
+
+/// A calibration of a linear axis.
+fn golden() -> CalibrationRecord<LinearContent> {
+    let text = include_str!("../../controller/golden/linear.json");
+    serde_json::from_str(text).expect("it is one")
+}
 
 /// Two runs of three positions, from both sides.
 fn data(deviation_mm: f64) -> String {
@@ -19,6 +26,35 @@ fn data(deviation_mm: f64) -> String {
         }
     }
     text
+}
+
+#[test]
+fn calibrations_are_listed_by_their_age_and_the_only_axis_need_not_be_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let here = folder.path();
+    fs::write(here.join("machine.toml"), LINEAR.machine).expect("there is room");
+    let refused = [
+        &["cal", "rollback", "machine.toml"][..],
+        &["cal", "activate", "machine.toml", "0123"],
+    ];
+    for words in refused {
+        truestage(here, words).with_code(2);
+        assert!(!here.join("machine-data").exists(), "{words:?}");
+    }
+    let store = truestage::for_tests::store_in(&here.join("machine-data"), "linear");
+    // Names are hashes: of five the order by age is the order by name hardly ever.
+    for day in [3, 1, 5, 2, 4] {
+        let mut record = golden();
+        record.head.created = format!("2026-01-0{day}T00:00:00Z");
+        store.save(&record).expect("there is room");
+    }
+    let listed = truestage(here, &["cal", "list", "machine.toml"]).with_code(0);
+    let listed = listed["calibrations"].as_array().expect("a list").iter();
+    let created: Vec<&str> = listed.map(|it| text(&it["created"])).collect();
+    let days = [1, 2, 3, 4, 5].map(|day| format!("2026-01-0{day}T00:00:00Z"));
+    assert_eq!(created, days);
+    let rolled = truestage(here, &["cal", "rollback", "machine.toml"]).with_code(2);
+    check_error(&rolled, &["axis x: no earlier calibration", "cal list"]);
 }
 
 #[test]

@@ -65,6 +65,7 @@ fn the_same_data_give_the_same_figures_from_a_pipe_and_from_any_spreadsheet() {
     let wide: Vec<u8> = plain.encode_utf16().flat_map(u16::to_le_bytes).collect();
     let marked = [
         ["\u{feff}".as_bytes(), plain.as_bytes()].concat(),
+        ["\u{feff}# by hand\n".as_bytes(), plain.as_bytes()].concat(),
         [&[0xFF, 0xFE], &wide[..]].concat(),
     ];
     for bytes in marked {
@@ -84,6 +85,36 @@ fn the_same_data_give_the_same_figures_from_a_pipe_and_from_any_spreadsheet() {
     fs::write(folder.path().join("data.csv"), b"run,approach\n1,\xB5").expect("there is room");
     let refused = truestage(folder.path(), &["iso230", "data.csv"]).with_code(2);
     check_error(&refused, &["data.csv", "line 2 is not UTF-8", "save the file as CSV"]);
+}
+
+/// Whoever names µm as mm has all numbers a thousand times too large, and they agree with one another.
+#[test]
+fn both_columns_in_a_wrong_unit_are_no_stage() {
+    let rows = |per_mm: f64| {
+        let mut text = "\u{feff}# by hand\nrun,approach,target_mm,measured_mm\n".to_owned();
+        for run in 1..=2 {
+            for at in 0..=20 {
+                let target = 3.0 * f64::from(at);
+                let measured = target + 0.01 * (target / 6.0).sin();
+                text += &format!("{run},+,{:.6},{:.6}\n", target * per_mm, measured * per_mm);
+            }
+        }
+        text
+    };
+    let folder = folder(&rows(1000.0));
+    for words in [&["iso230", "data.csv"][..], &["fit", "linear", "data.csv"]] {
+        let refused = truestage(folder.path(), words).with_code(2);
+        let parts = ["data.csv:12:18: ", "expected deviations within 5 mm", "to mm"];
+        check_error(&refused, &parts);
+    }
+    fs::write(folder.path().join("data.csv"), rows(1.0)).expect("there is room");
+    truestage(folder.path(), &["iso230", "data.csv"]).with_code(0);
+    // What is only doubtful is said, unless somebody wants to hear of errors alone.
+    fs::write(folder.path().join("data.csv"), rows(200.0)).expect("there is room");
+    let said = |words: &[&str]| truestage(folder.path(), words).said;
+    let usual = said(&["iso230", "data.csv"]);
+    assert!(usual.contains("warning: data.csv: its places lie 12 m apart"), "{usual}");
+    assert_eq!(said(&["iso230", "data.csv", "--quiet"]), "");
 }
 
 fn saved(folder: &Path, words: &[&str]) -> serde_json::Value {

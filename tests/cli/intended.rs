@@ -180,6 +180,17 @@ fn a_path_is_judged_without_a_machine() {
 
 /// What `truestage` says at a terminal where `answer` is typed, and its exit code.
 pub(crate) fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (String, Option<i32>) {
+    // Plain, whatever terminal the tests are started in.
+    at_a_terminal_of(folder, words, answer, &[("NO_COLOR", "1")])
+}
+
+/// The same in an environment that is otherwise that of an ordinary terminal.
+fn at_a_terminal_of(
+    folder: &Path,
+    words: &[&str],
+    answer: &str,
+    environment: &[(&str, &str)],
+) -> (String, Option<i32>) {
     let terminal = openpty(None, None).expect("a terminal can be had");
     let slave = || {
         Stdio::from(
@@ -191,6 +202,8 @@ pub(crate) fn at_a_terminal(folder: &Path, words: &[&str], answer: &str) -> (Str
     };
     let mut command = Command::new(program("truestage"));
     command.current_dir(folder).args(words);
+    command.env_remove("NO_COLOR").env("TERM", "xterm");
+    command.envs(environment.iter().copied());
     let mut running = command
         .stdin(slave())
         .stderr(slave())
@@ -251,6 +264,72 @@ fn a_person_is_asked_and_a_script_is_not() {
     assert!(!seen.contains("go on?"), "{seen}");
     assert_eq!(code, Some(4));
     assert_eq!(truestage(folder.path(), &["zero"]).code, Some(4));
+}
+
+#[test]
+fn a_terminal_has_colours_unless_it_is_asked_for_none() {
+    let folder = without_adapter();
+    let seen = |words: &[&str], environment: &[(&str, &str)]| {
+        at_a_terminal_of(folder.path(), words, "", environment).0
+    };
+    let red = "\u{1b}[31merror:\u{1b}[0m";
+    check_says(&seen(&["scan"], &[]), &[red, "no-such-adapter"]);
+    check_says(&seen(&["scan"], &[("NO_COLOR", "")]), &[red]);
+    for plain in [("NO_COLOR", "1"), ("TERM", "dumb")] {
+        let seen = seen(&["scan"], &[plain]);
+        assert!(
+            seen.contains("error:") && !seen.contains('\u{1b}'),
+            "{seen:?}"
+        );
+    }
+    assert!(!seen(&["scan", "--json"], &[]).contains('\u{1b}'));
+}
+
+#[test]
+fn what_was_read_is_said_to_who_wants_to_know_all() {
+    let folder = without_adapter();
+    let said = |words: &[&str]| truestage(folder.path(), words).said;
+    let read = "machine.toml was read; records are in ";
+    assert!(!said(&["scan"]).contains(read));
+    for words in [["scan", "-v"], ["--verbose", "scan"]] {
+        check_says(&said(&words), &[read, "error:", "no-such-adapter"]);
+    }
+    let both = truestage(folder.path(), &["scan", "-v", "-q"]).with_code(2);
+    check_error(&both, &["cannot be used with"]);
+}
+
+/// A jog says what it will do and asks, like each verb that moves something.
+#[test]
+fn a_jog_is_said_and_asked_for_before_anything_moves() {
+    let jog = ["jog", "x=-2.5mm/s", "--for", "1.5s"];
+    let said = check(LINEAR, &jog, &[("zero", "x"), ("jog", "x")]);
+    check_says(
+        &said.to_string(),
+        &["at -2.5 mm/s for 1.5s", "to its negative limit switch"],
+    );
+    let said = check(ROTARY, &["jog", "c=5deg/s"], &[("zero", "c"), ("jog", "c")]);
+    check_says(&said.to_string(), &["at 5 °/s until Ctrl-C"]);
+    check(
+        UVW,
+        &["jog", "y=1mm/s"],
+        &[("zero", "platform"), ("jog", "y")],
+    );
+    let all = ("zero", "x, y, z");
+    check(VOLUMETRIC, &["jog", "y=1mm/s"], &[all, ("jog", "y")]);
+    let folder = without_adapter();
+    let (seen, code) = at_a_terminal(folder.path(), &jog, "n\n");
+    check_says(
+        &seen,
+        &[
+            "x: jog: at -2.5 mm/s for 1.5s",
+            "go on?",
+            "nothing was moved",
+        ],
+    );
+    assert_eq!(code, Some(2));
+    let (seen, code) = at_a_terminal(folder.path(), &[&jog[..], &["--yes"]].concat(), "");
+    assert!(!seen.contains("go on?"), "{seen}");
+    assert_eq!(code, Some(4));
 }
 
 /// What has expired is told before a port is opened, let alone anything is zeroed.

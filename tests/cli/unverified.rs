@@ -119,6 +119,54 @@ fn beam_lost(bench: &Bench) -> Value {
     process.end().with_code(4)
 }
 
+/// What a second calibration tells whose stage begins to shake when its verification does.
+fn shaken(bench: &Bench) -> Value {
+    let mut process = bench.start(&["calibrate", "machine.toml", "--verify"]);
+    let mut time = Steps::of(bench);
+    time.until(&mut process, || entries(bench, "verify", "criterion") >= 2);
+    let shakes = "fault fault = { kind = \"vibration\", amplitude_um = 20.0 }";
+    lend_hand(&bench.folder().join("clock"), shakes).expect("the machine can shake");
+    drop(time);
+    process.end().with_code(5)
+}
+
+/// What was in use before was better, and is in use again; so the stage is corrected as well as it was.
+#[test]
+fn a_new_calibration_that_is_worse_gives_way_to_the_one_before_with_a_service_and_without() {
+    for rig in live_rigs() {
+        for is_kept in [false, true] {
+            let bench = Bench::new(rig);
+            let service = is_kept.then(|| keep(&bench));
+            let words = ["calibrate", "machine.toml", "--verify"];
+            let first = bench.run(&words).with_code(0);
+            let told = shaken(&bench);
+            drop(service);
+            let verification = &told["verification"];
+            assert_eq!(verification["ended"], "worse", "{told:#}");
+            assert_eq!(verification["stored"][0]["in_use"], false, "{told:#}");
+            let error = text(&told["error"]);
+            for part in [
+                "IS WORSE than what was before",
+                "its runs scatter",
+                "used before, is in use again",
+            ] {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+            let next = [
+                "truestage verify machine.toml",
+                "truestage calibrate machine.toml --verify",
+            ];
+            assert_eq!(verification["next"], json!(next));
+            let list = bench.run_plainly(&["cal", "list", "machine.toml"]);
+            let list = list.with_code(0)["calibrations"].clone();
+            let list = list.as_array().expect("a list");
+            let used: Vec<_> = list.iter().filter(|it| it["active"] == true).collect();
+            assert_eq!(used.len(), 1, "{list:?}");
+            assert_eq!(used[0]["id"], first["calibration"], "{first:#}");
+        }
+    }
+}
+
 #[test]
 fn a_verification_that_fails_tells_the_same_with_a_service_and_without() {
     for rig in live_rigs() {

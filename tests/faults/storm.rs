@@ -91,6 +91,7 @@ fn optics(failure: &Failure) -> bool {
             | Failure::StandsOff { .. }
             | Failure::Correction { .. }
             | Failure::MadeWorse { .. }
+            | Failure::NewIsWorse(_)
             | Failure::Compensation { .. }
     )
 }

@@ -8,7 +8,7 @@ impl Failure {
     pub fn tells_worse(&self) -> bool {
         match self {
             Self::Kind(failure) => failure.tells_worse(),
-            other => matches!(other, Self::MadeWorse { .. }),
+            other => matches!(other, Self::MadeWorse { .. } | Self::NewIsWorse(_)),
         }
     }
 
@@ -81,6 +81,7 @@ impl Failure {
             | Self::Fit { .. }
             | Self::Budget { .. }
             | Self::MadeWorse { .. }
+            | Self::NewIsWorse(_)
             | Self::OutOfTolerance { .. }
             | Self::Turned { .. }
             | Self::ZeroPlan { .. } => 5,

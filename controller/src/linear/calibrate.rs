@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use compensator::budget::AxisBudget;
 use compensator::error_table::{self, Compensation, FitOptions, Fitted, uncertainty};
+use compensator::iso230;
 use units::Metres;
 
 use crate::config::ConfigHash;
@@ -11,6 +12,7 @@ use crate::failure::Failure;
 use crate::linear::LinearContent;
 use crate::linear::LinearLog;
 use crate::linear::measure::{EarlierRuns, MeasureOptions, Measured};
+use crate::linear::memory::Untried;
 use crate::linear::run_plan::{RunPlan, of_calibration};
 use crate::linear::settings;
 use crate::linear::stage::{LinearStage, Usable};
@@ -91,6 +93,11 @@ impl LinearStage<'_> {
                 compensation,
                 budget: Some(budget.clone()),
                 approach: self.approach_length(),
+            });
+            let figures = iso230::evaluate(&measured.series()?).ok();
+            self.memory.untried = Some(Untried {
+                id: id.clone(),
+                as_found: figures.map(|it| it.accuracy.bidirectional),
             });
         }
         Ok(Calibrated {

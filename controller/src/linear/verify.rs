@@ -7,20 +7,26 @@ use compensator::error_table::{Compensation, ErrorTable};
 use compensator::iso230::{self, Figures};
 use units::{Approach, Metres};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, in_use_text};
 use crate::linear::calibrate::open_journal;
-use crate::linear::measure::{MeasureOptions, Measured};
+use crate::linear::measure::{MeasureOptions, Measured, series_of};
+use crate::linear::memory::Untried;
+use crate::linear::on_trial::NewIsWorse;
 use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
-use crate::linear::{CriterionEntry, LinearEntry};
+use crate::linear::{CriterionEntry, LinearEntry, LinearLog};
 use crate::run::{missing, note_failure};
 use crate::store::{Store, short};
 use crate::worse::likely_cause;
 use machine::Stage;
+use machine::records::read_journal;
 
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
 const SCALE_LIMIT_PPM: f64 = 1000.0;
+
+/// A of one and the same axis differs by less from one verification to the next, when nothing is wrong.
+const CLEARLY: f64 = 1.25;
 
 /// How a verification is made.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,7 +90,8 @@ impl LinearStage<'_> {
 
     /// Measures the axis at the configuration's verification targets and evaluates ISO 230-2.
     /// Being out of tolerance is a result here, not an error; being out of tolerance and worse
-    /// than without the calibration is one, and takes the calibration out of use.
+    /// than without the calibration is one, and takes the calibration out of use. So is the first
+    /// verification of one that was just made, when that is out of tolerance and clearly worse than the axis was before.
     ///
     /// # Errors
     /// When the axis is not zeroed or anything stops the machine.
@@ -136,7 +143,9 @@ impl LinearStage<'_> {
             uncertainty,
         };
         if options.compensated {
-            self.judge_benefit(store, &verified, options.calibration.as_deref())
+            let calibration = options.calibration.as_deref();
+            self.judge_benefit(store, &verified, calibration)
+                .and_then(|()| self.judge_new(store, &verified, calibration))
                 .inspect_err(|failure| note_failure(&mut journal, failure))?;
         }
         Ok(verified)
@@ -178,6 +187,49 @@ impl LinearStage<'_> {
         })
     }
 
+    /// A calibration that was just made stays in use when its first verification is within tolerance, or not clearly
+    /// worse than what was before; of one that has proved itself a bad day is no reason to go back.
+    fn judge_new(
+        &mut self,
+        store: &Store,
+        verified: &Verified,
+        calibration: Option<&str>,
+    ) -> Result<(), Failure> {
+        let untried = self.memory.untried.take();
+        let Some(made) = untried.filter(|it| Some(it.id.as_str()) == calibration) else {
+            return Ok(());
+        };
+        let seen = verified.figures.accuracy.bidirectional;
+        if verified.is_within_tolerance() {
+            return Ok(());
+        }
+        let before = before(store, self.axis, &made)?;
+        let Some(before) = before.filter(|it| it.accuracy * CLEARLY < seen) else {
+            return Ok(());
+        };
+        let cause = match self.compensation() {
+            Some(compensation) if !scatters(&verified.figures) => {
+                likely_cause(&pairs(compensation, &verified.figures))
+            }
+            _ => format!(
+                "its runs scatter, R = {:.3} µm, which no calibration takes away: vibration, a loose optic or mount, \
+                 a servo that hunts",
+                verified.figures.repeatability.bidirectional.um()
+            ),
+        };
+        let in_use = self.fall_back(store, calibration)?;
+        Err(Failure::NewIsWorse(Box::new(NewIsWorse {
+            axis: self.axis.to_owned(),
+            calibration: short(&made.id),
+            seen,
+            limit: verified.tolerance,
+            before: before.accuracy,
+            was: before.what,
+            cause,
+            then: in_use_text(in_use.as_deref().map(short).as_deref()),
+        })))
+    }
+
     /// Goes back to the newest calibration before `calibration` that fits this machine, or to
     /// none.
     fn fall_back(
@@ -190,13 +242,65 @@ impl LinearStage<'_> {
         if calibration.is_none() || store.active(self.axis)?.current.as_deref() != calibration {
             return Ok(None);
         }
-        while store.retire(self.axis)?.is_some() {
-            if let Ok(loaded) = self.load_active(store) {
-                return Ok(loaded);
-            }
+        let mut found = None;
+        let in_use = store.retire_to(self.axis, |id| {
+            found = self.usable(store, id).ok();
+            found.is_some()
+        })?;
+        if let Some(usable) = found {
+            self.use_calibration(usable);
         }
-        Ok(None)
+        Ok(in_use)
     }
+}
+
+/// How good an axis was before a calibration.
+struct Before {
+    /// A, bidirectional.
+    accuracy: Metres,
+    /// With what, in words.
+    what: String,
+}
+
+/// How good the axis was before `made`: as what was in use was last verified, or as found; the better of both.
+fn before(store: &Store, axis: &str, made: &Untried) -> Result<Option<Before>, Failure> {
+    let found = made.as_found.map(|accuracy| Before {
+        accuracy,
+        what: "as found".into(),
+    });
+    let earlier = store.active(axis)?.history.pop();
+    let recorded = match &earlier {
+        None => None,
+        Some(id) => recorded_accuracy(store, axis, id)?.map(|accuracy| Before {
+            accuracy,
+            what: format!("with calibration {} when it was last verified", short(id)),
+        }),
+    };
+    let known = recorded.into_iter().chain(found);
+    Ok(known.min_by(|a, b| a.accuracy.value().total_cmp(&b.accuracy.value())))
+}
+
+/// A of the newest whole verification of `axis` with the calibration `id`; what cannot be read is passed over.
+fn recorded_accuracy(store: &Store, axis: &str, id: &str) -> Result<Option<Metres>, Failure> {
+    let part = format!("-verify-{axis}-");
+    let mut names = store.journals()?;
+    names.retain(|it| it.contains(&part));
+    names.sort_unstable();
+    let newest_first = names.iter().rev();
+    let mut accuracies = newest_first.filter_map(|name| {
+        let journal = read_journal::<LinearLog>(&store.runs().join(name)).ok()?;
+        let header = &journal.header;
+        let is_whole = journal.log.closures.len() == header.runs as usize;
+        let is_its = header.axis == axis && header.calibration.as_deref() == Some(id);
+        let series = (is_its && is_whole).then(|| series_of(&journal.log.points).ok())??;
+        Some(iso230::evaluate(&series).ok()?.accuracy.bidirectional)
+    });
+    Ok(accuracies.next())
+}
+
+/// Whether what is left is mostly no deviation of the axis, but differs from run to run.
+fn scatters(left: &Figures) -> bool {
+    left.repeatability.bidirectional > left.systematic_deviation.bidirectional
 }
 
 /// As the journal has it.

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::config::{self, Loaded};
+use crate::program::AskArgs;
 use crate::program::answering::Asked;
 use crate::program::intended::{Intent, Step};
 use crate::program::kept::{self, Service};
@@ -22,22 +23,40 @@ pub(crate) fn run(intent: Intent<'_>, output: Output) -> Ended {
         let loaded = config::load(&intent.machine().config)?;
         loaded.filled_in()?;
         let steps = steps(kind, &loaded, intent)?;
-        let ask = intent.ask();
-        if ask.dry_run {
-            return output.result(&told(&loaded, &steps), &value(&loaded, &steps));
+        let zeroes_first = !matches!(intent, Intent::Zero(_));
+        match said(&loaded, &steps, (intent.ask(), zeroes_first), output)? {
+            Some(ended) => ended,
+            None => here(intent, kind, output),
         }
-        let is_asked = stdin().is_terminal() && stderr().is_terminal();
-        if !ask.yes && is_asked && steps.iter().any(Step::moves) {
-            output.note(&told(&loaded, &steps));
-            if is_kept(&loaded) && !matches!(intent, Intent::Zero(_)) {
-                output
-                    .note("  a service keeps this machine: what has its zero is not zeroed again");
-            }
-            agreed_to(output)?;
-        }
-        here(intent, kind, output)
     });
     kept::or_by_its_service(ended, |service| there(intent, service, output))
+}
+
+/// Says what is going to happen, and asks whether it shall; how a verb ends that was only to say it. `zeroes_first`:
+/// it finds a zero only where there is none, if a service keeps the machine.
+///
+/// # Errors
+/// When nobody agrees.
+pub(crate) fn said(
+    loaded: &Loaded,
+    steps: &[Step],
+    (ask, zeroes_first): (AskArgs, bool),
+    output: Output,
+) -> Result<Option<Ended>, Failure> {
+    if ask.dry_run {
+        let ended = output.result(&told(loaded, steps), &value(loaded, steps));
+        return Ok(Some(ended));
+    }
+    let is_asked = stdin().is_terminal() && stderr().is_terminal();
+    if !ask.yes && is_asked && steps.iter().any(Step::moves) {
+        output.must_say(&told(loaded, steps));
+        if is_kept(loaded) && zeroes_first {
+            output
+                .must_say("  a service keeps this machine: what has its zero is not zeroed again");
+        }
+        agreed_to(output)?;
+    }
+    Ok(None)
 }
 
 /// Whether a service has the machine.
@@ -75,7 +94,7 @@ fn value(loaded: &Loaded, steps: &[Step]) -> Value {
 
 /// Waits for a yes.
 fn agreed_to(output: Output) -> Result<(), Failure> {
-    output.note("go on? y and Enter; anything else leaves everything where it is");
+    output.must_say("go on? y and Enter; anything else leaves everything where it is");
     let mut answer = String::new();
     let read = stdin().lock().read_line(&mut answer);
     let is_yes = matches!(answer.trim(), "y" | "Y" | "yes");

@@ -10,7 +10,7 @@ use units::{Approach, Short};
 
 use crate::program::page::escape;
 use crate::store::budget::{
-    ContributionRecord, CorrelationRecord, PlaceBudgetRecord, PlacesBudgetRecord,
+    ContributionRecord, CorrelationRecord, PlaceBudgetRecord, PlacesBudgetRecord, told_freedom,
 };
 
 /// Contributions that are named in one line.
@@ -234,8 +234,9 @@ pub(crate) fn value_of(
     })
 }
 
+/// Records of earlier programs have numbers of them that nobody reads.
 fn freedom(it: Option<f64>, decimals: usize) -> String {
-    it.map_or("∞".to_owned(), |it| format!("{it:.decimals$}"))
+    told_freedom(it).map_or("∞".to_owned(), |it| format!("{it:.decimals$}"))
 }
 
 /// What a contribution does at two places, in words.

@@ -20,7 +20,7 @@ use crate::{Failure, config};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CalCommand {
-    /// All calibrations of the machine; `*` marks those in use.
+    /// All calibrations of the machine, the oldest first; `*` marks those in use.
     List {
         /// The machine's configuration.
         #[arg(default_value = "machine.toml")]
@@ -57,9 +57,9 @@ pub(crate) enum CalCommand {
         /// The machine's configuration.
         config: PathBuf,
         /// Which axis; `platform` for all screws of one at once, `volume` for the errors of three axes and what counts
-        /// from them.
+        /// from them. May be left out when there is only one of these.
         #[arg(long)]
-        axis: String,
+        axis: Option<String>,
     },
     /// Write a calibration in the form of another control (LinuxCNC, SINUMERIK, PMAC), or as CSV.
     Export(ExportArgs),
@@ -81,7 +81,8 @@ pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
             chosen(config, &Choice::Activate(id.clone()), output)
         }
         CalCommand::Rollback { config, axis } => {
-            chosen(config, &Choice::Rollback(axis.clone()), output)
+            let axis = the_axis(config, axis.as_deref())?;
+            chosen(config, &Choice::Rollback(axis), output)
         }
         CalCommand::Export(args) => export::run(args, output),
         CalCommand::Import(args) => import::run(args, put_into_use, output),
@@ -100,8 +101,7 @@ fn list(store: &Store, output: Output) -> Ended {
 
 /// All calibrations, as text and as JSON.
 pub(crate) fn listed(store: &Store) -> Result<(String, Value), Failure> {
-    let mut lines = Vec::new();
-    let mut values = Vec::new();
+    let mut all = Vec::new();
     for id in store.list()? {
         match store.glance(&id) {
             Ok(Glance {
@@ -110,7 +110,7 @@ pub(crate) fn listed(store: &Store) -> Result<(String, Value), Failure> {
                 summary,
             }) => {
                 let used = store.active(&head.axis)?.current.as_deref() == Some(&id);
-                lines.push(format!(
+                let line = format!(
                     "{} {}  {}  axis {}  {}  {}",
                     if used { '*' } else { ' ' },
                     short(&id),
@@ -118,17 +118,21 @@ pub(crate) fn listed(store: &Store) -> Result<(String, Value), Failure> {
                     head.axis,
                     summary,
                     head.source
-                ));
-                values.push(json!({"id": id, "active": used, "axis": head.axis,
-                                   "kind": kind, "created": head.created,
-                                   "source": head.source}));
+                );
+                let value = json!({"id": id, "active": used, "axis": head.axis, "kind": kind,
+                                   "created": head.created, "source": head.source});
+                all.push((head.created, line, value));
             }
             Err(error) => {
-                lines.push(format!("! {}  {error}", short(&id)));
-                values.push(json!({"id": id, "error": error.to_string()}));
+                let line = format!("! {}  {error}", short(&id));
+                let value = json!({"id": id, "error": error.to_string()});
+                all.push((String::new(), line, value));
             }
         }
     }
+    // Times as they are stored are in order as text; what cannot be read has none, and comes first.
+    all.sort_by(|a, b| a.0.cmp(&b.0));
+    let (mut lines, values): (Vec<_>, Vec<_>) = all.into_iter().map(|it| (it.1, it.2)).unzip();
     if lines.is_empty() {
         lines.push("no calibrations yet; `truestage calibrate` makes one".into());
     }
@@ -208,6 +212,24 @@ pub(crate) fn compared(
     Ok((lines.join("\n"), json!({"changes": values})))
 }
 
+/// What is gone back for: the one that is named, or the only one.
+fn the_axis(path: &Path, axis: Option<&str>) -> Result<String, Failure> {
+    if let Some(axis) = axis {
+        return Ok(axis.to_owned());
+    }
+    let groups = groups(&config::load(path)?.config);
+    match groups.as_slice() {
+        [only] => Ok(only.name.clone()),
+        all => {
+            let names: Vec<&str> = all.iter().map(|it| it.name.as_str()).collect();
+            Err(Failure::Usage {
+                what: "the machine has several axes".into(),
+                help: format!("add --axis with one of {}", names.join(", ")),
+            })
+        }
+    }
+}
+
 /// What is used from now on: done here, or by the service that keeps the machine.
 fn chosen(path: &Path, choice: &Choice, output: Output) -> Ended {
     let here = choose(path, choice).and_then(|changes| {
@@ -226,6 +248,12 @@ fn chosen(path: &Path, choice: &Choice, output: Output) -> Ended {
 fn choose(path: &Path, choice: &Choice) -> Result<Vec<Change>, Failure> {
     let loaded = config::load(path)?;
     let store = loaded.config.machine.store();
+    let groups = groups(&loaded.config);
+    let changes = || Group::chosen(&groups, &store, choice)?.changes(&store, choice);
+    if !store.root().exists() {
+        // A lease would make the folder.
+        changes()?;
+    }
     // Whoever measures with a calibration must find it there to the end.
     let verb = match choice {
         Choice::Activate(_) => "cal activate",
@@ -233,8 +261,7 @@ fn choose(path: &Path, choice: &Choice) -> Result<Vec<Change>, Failure> {
         Choice::Clear(_) => "memory clear",
     };
     let _lease = Lease::take(&store, verb)?;
-    let groups = groups(&loaded.config);
-    let changes = Group::chosen(&groups, &store, choice)?.changes(&store, choice)?;
+    let changes = changes()?;
     for id in changes.iter().filter_map(|it| it.id.as_ref()) {
         head_of(&loaded, &store, id)?;
     }

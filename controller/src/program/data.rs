@@ -20,6 +20,7 @@ use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::linear::elsewhere::Elsewhere;
 use crate::program::linear::uncertainty;
 use crate::program::output::{Ended, Output};
+use crate::program::plausible;
 use crate::program::{json as to_json, text};
 use crate::{Failure, config};
 
@@ -111,11 +112,19 @@ fn series_of_journal(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSe
 
 /// Reads a series; columns of the environment that nothing would use are refused, as nobody could tell whether the
 /// readings are corrected by them.
-fn series_of(path: &Path, by: Option<&Elsewhere<'_>>) -> Result<LinearSeries, Failure> {
+fn series_of(
+    path: &Path,
+    by: Option<&Elsewhere<'_>>,
+    output: Output,
+) -> Result<LinearSeries, Failure> {
     if is_journal(path) {
         return series_of_journal(path, by);
     }
-    let series = LinearSeries::from_csv(&read(path)?, &name_of(path))?;
+    let (text, name) = (read(path)?, name_of(path));
+    let series = LinearSeries::from_csv(&text, &name)?;
+    if let Some(doubt) = plausible::positions(&text, &name, ["target_mm", "measured_mm"])? {
+        output.note(&doubt);
+    }
     match by {
         Some(by) => by.corrected(&series),
         None if series.environments().is_empty() => Ok(series),
@@ -156,7 +165,7 @@ pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
 pub(crate) fn iso230(path: &Path, by: &MeasuredBy, output: Output) -> Ended {
     let loaded = by.loaded(None)?;
     let by = loaded.as_ref().map(|it| by.instrument(it)).transpose()?;
-    let series = series_of(path, by.as_ref())?;
+    let series = series_of(path, by.as_ref(), output)?;
     if is_single(&series) {
         let means = iso230::evaluate_means(&series)?;
         return output.result(&text::means(&means), &to_json::means(&means));
@@ -211,7 +220,7 @@ fn linear(
 ) -> Ended {
     let loaded = by.loaded(save)?;
     let by = loaded.as_ref().map(|it| by.instrument(it)).transpose()?;
-    let series = series_of(path, by.as_ref())?;
+    let series = series_of(path, by.as_ref(), output)?;
     let name = axis.unwrap_or("x").to_owned();
     let fitted = error_table::analyse(&series, &FitOptions::default())
         .map_err(|source| Failure::Fit { axis: name, source })?;
@@ -325,6 +334,11 @@ pub(super) fn linear_axis(
     }
 }
 
+/// Rounded to what is printed, so that nothing prints as `-0.0000`.
+fn without_minus_zero(volts: f64) -> f64 {
+    (volts * 1e4).round() / 1e4 + 0.0
+}
+
 fn hall(path: &Path, output: Output) -> Ended {
     if is_journal(path) {
         return Err(Failure::Usage {
@@ -346,7 +360,7 @@ fn hall(path: &Path, output: Output) -> Ended {
         estimate.points,
         estimate.left.position.um(),
         estimate.right.position.um(),
-        estimate.mid_voltage.value()
+        without_minus_zero(estimate.mid_voltage.value())
     );
     output.result(&text, &to_json::zero(&estimate))
 }
@@ -358,6 +372,14 @@ mod tests {
     const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
     const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        for volts in [-0.0, -0.00004, 0.00004] {
+            assert_eq!(format!("{:.4}", without_minus_zero(volts)), "0.0000");
+        }
+        assert_eq!(format!("{:.4}", without_minus_zero(-0.00006)), "-0.0001");
+    }
 
     #[track_caller]
     fn check(text: &str, axis: Option<&str>, expected: Result<&str, &str>) {

@@ -7,7 +7,9 @@ use crate::Failure;
 
 /// What stands for standard input where a file is named.
 const STANDARD_INPUT: &str = "-";
-/// The marks that spreadsheets write before UTF-16, the lower byte first and the higher one.
+/// The mark that they write before UTF-8.
+const MARK: char = '\u{FEFF}';
+/// The marks before UTF-16, the lower byte first and the higher one.
 const LOW_FIRST: [u8; 2] = [0xFF, 0xFE];
 const HIGH_FIRST: [u8; 2] = [0xFE, 0xFF];
 
@@ -63,7 +65,7 @@ fn decoded(bytes: &[u8]) -> io::Result<String> {
         return wide(u16::from_be_bytes);
     }
     match core::str::from_utf8(bytes) {
-        Ok(text) => Ok(text.to_owned()),
+        Ok(text) => Ok(text.strip_prefix(MARK).unwrap_or(text).to_owned()),
         Err(error) => {
             let sound = &bytes[..error.valid_up_to()];
             let line = 1 + sound.iter().filter(|it| **it == b'\n').count();
@@ -88,6 +90,7 @@ mod tests {
     #[test]
     fn what_spreadsheets_write_is_text() {
         check("µm\n".as_bytes(), "µm\n");
+        check("\u{FEFF}# by hand\n".as_bytes(), "# by hand\n");
         check(&[0xFF, 0xFE, b'a', 0, 0xB5, 0], "aµ");
         check(&[0xFE, 0xFF, 0, b'a', 0, 0xB5], "aµ");
         check(b"", "");

@@ -7,7 +7,9 @@ use clap::Args;
 use units::AxisSpeed;
 use units::text::axis_speed;
 
-use crate::program::MachineArgs;
+use crate::config::{self, Loaded};
+use crate::program::before::said;
+use crate::program::intended::{Intent, Step, nowhere};
 use crate::program::jogs::Jog;
 use crate::program::json::counters;
 use crate::program::kept::or_by_its_service;
@@ -15,6 +17,8 @@ use crate::program::kind::by_kind;
 use crate::program::output::{Ended, Output, with_counters};
 use crate::program::session::Session;
 use crate::program::span::span_of;
+use crate::program::verbs::Verbs;
+use crate::program::{AskArgs, AxisArgs, MachineArgs, ZeroArgs};
 use crate::{Failure, Machine};
 
 /// Which axis, which way, how fast and for how long.
@@ -30,6 +34,8 @@ pub(crate) struct JogArgs {
     /// further) or with Ctrl-C.
     #[arg(long = "for", value_name = "TIME", value_parser = span_of)]
     span: Option<Duration>,
+    #[command(flatten)]
+    ask: AskArgs,
 }
 
 impl JogArgs {
@@ -67,6 +73,26 @@ fn speed_of_axis(text: &str) -> Result<(String, AxisSpeed), Failure> {
     })
 }
 
+/// What the jog will do; refuses what makes no sense.
+fn steps(
+    kind: &Verbs,
+    loaded: &Loaded,
+    (args, jog): (&JogArgs, &Jog),
+) -> Result<Vec<Step>, Failure> {
+    (kind.jog.check)(&mut nowhere::machine(loaded), jog)?;
+    let zero = ZeroArgs {
+        axis: AxisArgs {
+            machine: args.machine.clone(),
+            axis: kind.jog.zeroed.is_none().then(|| jog.axis.clone()),
+        },
+        ask: args.ask,
+    };
+    let store = loaded.config.machine.store();
+    let mut steps = (kind.intended)(loaded, &store, Intent::Zero(&zero))?;
+    steps.push(kind.jog.step(jog));
+    Ok(steps)
+}
+
 /// Jogs an axis here, or by the service that keeps its machine.
 pub(crate) fn run(args: &JogArgs, output: Output) -> Ended {
     or_by_its_service(here(args, output), |service| service.jog(args, output))
@@ -76,6 +102,12 @@ pub(crate) fn run(args: &JogArgs, output: Output) -> Ended {
 fn here(args: &JogArgs, output: Output) -> Ended {
     let jog = args.jog()?;
     by_kind(&args.machine, [jog.axis.as_str()].into_iter(), |kind| {
+        let loaded = config::load(&args.machine.config)?;
+        loaded.filled_in()?;
+        let steps = steps(kind, &loaded, (args, &jog))?;
+        if let Some(ended) = said(&loaded, &steps, (args.ask, true), output)? {
+            return ended;
+        }
         let mut session = Session::open(&args.machine, "jog", kind.jog.purpose, output)?;
         let store = session.store.clone();
         let (jogged, counters) = session.machine.guarded(|machine: &mut Machine| {

@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use machine::records::Store;
 use serde_json::{Value, json};
-use units::{AxisSpeed, LengthOrAngle, Metres, Radians};
+use units::{AxisSpeed, LengthOrAngle, Metres, Radians, ShortSpan};
 
 use crate::jogging::{Jogged, along};
 use crate::ports::Use;
+use crate::program::intended::Step;
 use crate::{Failure, Machine};
 
 /// What was asked for.
@@ -38,15 +39,21 @@ impl Jog {
 
 fn of_linear_axis(machine: &mut Machine, store: &Store, jog: &Jog) -> Result<Jogged, Failure> {
     let speed = along(&jog.axis, jog.speed)?;
-    machine.linear(&jog.axis)?.check_jog(speed)?;
     machine.start()?;
     machine.linear(&jog.axis)?.zero(store)?;
     machine.linear(&jog.axis)?.jog(speed, jog.duration)
 }
 
+fn check_of_linear_axis(machine: &mut Machine, jog: &Jog) -> Result<(), Failure> {
+    let speed = along(&jog.axis, jog.speed)?;
+    machine.linear(&jog.axis)?.check_jog(speed)
+}
+
 /// How a kind jogs.
 pub(crate) struct Jogs {
-    /// Starts the machine, finds the zero, and jogs. What makes no sense is refused before.
+    /// Refuses what makes no sense; the machine is not asked.
+    pub(crate) check: fn(&mut Machine, &Jog) -> Result<(), Failure>,
+    /// Starts the machine, finds the zero, and jogs.
     pub(crate) run: fn(&mut Machine, &Store, &Jog) -> Result<Jogged, Failure>,
     /// What the machine is opened for: what the zero needs.
     pub(crate) purpose: Use,
@@ -61,12 +68,32 @@ pub(crate) struct Jogs {
 impl Jogs {
     /// Of a linear axis, whatever else its machine is.
     pub(crate) const OF_A_LINEAR_AXIS: Self = Self {
+        check: check_of_linear_axis,
         run: of_linear_axis,
         purpose: Use::Motion,
         zeroed: None,
         by: "its encoder",
         end: ("at its soft limit", "at_soft_limit"),
     };
+
+    /// The jog itself, as it is said beforehand.
+    pub(crate) fn step(&self, jog: &Jog) -> Step {
+        let (speed, unit) = match jog.speed {
+            AxisSpeed::Linear(it) => (it.value() * 1e3, "mm/s"),
+            AxisSpeed::Angular(it) => (it.value().to_degrees(), "°/s"),
+        };
+        let speed = format!("{speed:.6}");
+        let speed = speed.trim_end_matches('0').trim_end_matches('.');
+        let until = match jog.duration {
+            Some(span) => format!("for {}, ", ShortSpan(span)),
+            None => "until Ctrl-C, ".to_owned(),
+        };
+        let text = format!(
+            "at {speed} {unit} {until}and no longer than until it is {}; NOT CORRECTED: by {} alone",
+            self.end.0, self.by
+        );
+        Step::new("jog", &jog.axis, text)
+    }
 
     pub(crate) fn text(&self, axis: &str, jogged: &Jogged) -> String {
         let end = match jogged.is_at_end {

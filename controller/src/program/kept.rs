@@ -208,7 +208,7 @@ impl Service {
                 let _ = ask(&self.at, "POST", &format!("{path}/abort"), "{}");
             }
         })?;
-        let mut bars = Bars::new(waiting.output.is_json());
+        let mut bars = waiting.output.bars(Bars::new);
         let begun = Instant::now();
         let ending = match run["can_resume"] == true {
             true => "pause",

@@ -32,7 +32,9 @@ mod new;
 mod operator;
 mod output;
 mod page;
+mod paint;
 mod platform;
+mod plausible;
 mod progress;
 mod refused;
 mod report;
@@ -68,7 +70,7 @@ use wire::lockstep::path_of;
 use crate::ports::Pace;
 use crate::{Agreed, Failure, made_by};
 use intended::Intent;
-use output::{Ended, Output};
+use output::{Ended, Output, SaidArgs};
 use refused::not_understood;
 use rotary::readings::ReadingsArgs;
 use schema::verb_of;
@@ -86,6 +88,8 @@ struct Cli {
     /// Print one JSON object on stdout instead of text.
     #[arg(long, global = true)]
     json: bool,
+    #[command(flatten)]
+    said: SaidArgs,
     #[command(subcommand)]
     command: Command,
 }
@@ -430,11 +434,11 @@ pub fn main(
         Err(refused) => return not_understood(&refused),
     };
     // As long as the program: there is one.
-    let output = Output::new(cli.json, verb.leak());
+    let output = Output::new(cli.json, verb.leak()).saying(cli.said.said());
     match done(cli.command, output, keep, enrol) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(failure)) => {
-            output.note(&format!("error: {failure}"));
+            output.must_say(&format!("error: {failure}"));
             ExitCode::from(failure.exit_code())
         }
         Err(failure) => {

@@ -103,7 +103,7 @@ impl Terminal {
 
     /// Asks for what `text` says, which a hand does by `words`.
     fn ask_for(&mut self, text: &str, words: &str) -> Result<(), Failure> {
-        self.output.note(&format!("> {text}"));
+        self.output.must_say(&format!("> {text}"));
         let answers = match &self.answers {
             Answers::Nobody => return Ok(()),
             Answers::Hand(socket) => return self.lend_hand(socket, words),
@@ -115,7 +115,7 @@ impl Terminal {
             true => "the drives of this run are switched off",
             false => "this run has no drives",
         };
-        self.output.note(&format!(
+        self.output.must_say(&format!(
             "  {drives}, which is not a safe stop: make the machine safe first; press Enter when it is \
              done, Ctrl-C to stop (what was read is kept)"
         ));
@@ -131,13 +131,13 @@ impl Terminal {
     /// Asks for what a job waits for; the axis is held under power meanwhile. An emulated machine's hand has nothing
     /// to do.
     pub(crate) fn ask_to_go_on(&mut self, text: &str) -> Result<(), Failure> {
-        self.output.note(&format!("> {text}"));
+        self.output.must_say(&format!("> {text}"));
         let Answers::Keyboard(answers) = &self.answers else {
             return Ok(());
         };
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
-        self.output.note(
+        self.output.must_say(
             "  the axis holds its place under power and moves as soon as you press Enter: be out of its way \
              first; Ctrl-C stops it (what was reached is kept)",
         );
@@ -168,7 +168,7 @@ impl Terminal {
     pub(crate) fn ask_for_plate(&mut self, task: &PlateTask, text: &str) -> Result<(), Failure> {
         if let (PlateMove::TurnBy(0.0), Answers::Hand(_)) = (task.by, &self.answers) {
             // A hand that took it up would not put it down in the same place.
-            self.output.note(&format!("> {text}"));
+            self.output.must_say(&format!("> {text}"));
             return Ok(());
         }
         let words = match task.by {
@@ -198,11 +198,11 @@ impl Operator for Terminal {
 
 impl Person for Terminal {
     fn tell(&mut self, text: &str) {
-        self.output.note(text);
+        self.output.must_say(text);
     }
 
     fn question(&mut self, question: &Question) -> Result<(), Failure> {
-        self.output.note(&format!("? {}", question.text));
+        self.output.must_say(&format!("? {}", question.text));
         self.typed.clear();
         match &self.answers {
             Answers::Nobody => Err(Failure::Usage {
@@ -233,7 +233,7 @@ impl Person for Terminal {
     }
 
     fn refuse(&mut self, why: &str) -> Result<(), Failure> {
-        self.output.note(&format!("  not taken: {why}"));
+        self.output.must_say(&format!("  not taken: {why}"));
         self.typed.clear();
         match &self.answers {
             // Lines that were pasted behind it would be taken for others.
@@ -320,7 +320,7 @@ impl LineOperator for Terminal {
 
     fn pack_up(&mut self) -> Result<(), Failure> {
         self.output
-            .note("> the interferometer is no longer needed and may be packed up");
+            .must_say("> the interferometer is no longer needed and may be packed up");
         match &self.answers {
             Answers::Hand(socket) => self.lend_hand(socket, "take-line-away"),
             Answers::Keyboard(_) | Answers::Nobody => Ok(()),
@@ -328,7 +328,7 @@ impl LineOperator for Terminal {
     }
 
     fn tell(&mut self, text: &str) {
-        self.output.note(&format!("> {text}"));
+        self.output.must_say(&format!("> {text}"));
     }
 }
 

@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 
 use crate::Failure;
 use crate::config::ConfigError;
-use crate::program::progress;
+use crate::program::paint;
+use crate::program::progress::{self, Bars};
 use crate::runs::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
@@ -26,17 +27,67 @@ pub(crate) const SCHEMA: u32 = 1;
 /// What stands for the verb where the words of the command line name none that can be run.
 pub(crate) const NO_VERB: &str = "";
 
+/// How much is said on standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Said {
+    /// Errors and questions alone.
+    Least,
+    /// Warnings and what happens, too.
+    #[default]
+    Usual,
+    /// And what is read, opened and written for it.
+    Most,
+}
+
+/// The words of the command line for it.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(crate) struct SaidArgs {
+    /// Say nothing on standard error but errors and questions.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on standard error, too, what is read, opened and written.
+    #[arg(long, short, global = true)]
+    verbose: bool,
+}
+
+impl SaidArgs {
+    pub(crate) const fn said(self) -> Said {
+        match (self.quiet, self.verbose) {
+            (true, _) => Said::Least,
+            (_, true) => Said::Most,
+            _ => Said::Usual,
+        }
+    }
+}
+
 /// How results are printed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
     json: bool,
+    said: Said,
     /// Whose, in full: `cal list`.
     verb: &'static str,
 }
 
 impl Output {
     pub(crate) const fn new(json: bool, verb: &'static str) -> Self {
-        Self { json, verb }
+        Self {
+            json,
+            said: Said::Usual,
+            verb,
+        }
+    }
+
+    pub(crate) const fn saying(self, said: Said) -> Self {
+        Self { said, ..self }
+    }
+
+    /// What is shown of a procedure that runs; `made` is told whether bars are hidden.
+    pub(crate) fn bars(self, made: fn(bool) -> Bars) -> Bars {
+        match self.said {
+            Said::Least => Bars::none(),
+            Said::Usual | Said::Most => made(self.json),
+        }
     }
 
     pub(crate) const fn is_json(self) -> bool {
@@ -66,10 +117,10 @@ impl Output {
     }
 
     fn print(self, text: &str, value: &Value) {
-        let line = if self.json {
-            self.object(value)
-        } else {
-            text.to_owned()
+        let line = match self.json {
+            true => self.object(value),
+            false if paint::is_wanted(&std::io::stdout()) => paint::painted(text),
+            false => text.to_owned(),
         };
         progress::settle();
         // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
@@ -92,8 +143,28 @@ impl Output {
 
     /// What happens meanwhile, for people; on stderr so that stdout stays one object.
     pub(crate) fn note(self, text: &str) {
+        if self.said != Said::Least {
+            self.must_say(text);
+        }
+    }
+
+    /// What is done for it, for who wants to know all.
+    pub(crate) fn detail(self, text: impl FnOnce() -> String) {
+        if self.said == Said::Most {
+            self.must_say(&text());
+        }
+    }
+
+    /// Errors, and questions with what must be known to answer them.
+    pub(crate) fn must_say(self, text: &str) {
         progress::settle();
-        let _ = writeln!(std::io::stderr().lock(), "{text}");
+        let is_painted = !self.json && paint::is_wanted(&std::io::stderr());
+        let painted = is_painted.then(|| paint::painted(text));
+        let _ = writeln!(
+            std::io::stderr().lock(),
+            "{}",
+            painted.as_deref().unwrap_or(text)
+        );
     }
 
     /// Why the command line was refused, for programs.
@@ -110,7 +181,7 @@ impl Output {
             }
             self.print("", &error);
         }
-        self.note(&format!("error: {failure}"));
+        self.must_say(&format!("error: {failure}"));
     }
 }
 

@@ -25,6 +25,8 @@ enum Shown {
     Lines(Lines),
     /// Warnings, and nothing else.
     Hidden,
+    /// Nothing at all.
+    Nowhere,
 }
 
 impl Bars {
@@ -35,6 +37,11 @@ impl Bars {
             (true, true) => Shown::Hidden,
             (true, false) => Shown::Terminal(None),
         })
+    }
+
+    /// Nothing is shown.
+    pub(crate) const fn none() -> Self {
+        Self(Shown::Nowhere)
     }
 
     /// Of an emulated machine that lives as fast as the computer goes: bars, or nothing.
@@ -48,6 +55,7 @@ impl Bars {
     /// A line on stderr, above a bar that is drawn there.
     fn say(&self, line: String) {
         match &self.0 {
+            Shown::Nowhere => {}
             Shown::Lines(lines) => lines.say(line),
             Shown::Terminal(Some((_, bar))) if !bar.is_finished() => {
                 bar.suspend(|| eprintln!("{line}"));
@@ -70,7 +78,7 @@ fn bar_of(stage: Stage, axis: &str, total: u64) -> ProgressBar {
 impl Observer for Bars {
     fn progress(&mut self, stage: Stage, axis: &str, done: u64, total: u64) {
         let shown = match &mut self.0 {
-            Shown::Hidden => return,
+            Shown::Hidden | Shown::Nowhere => return,
             Shown::Lines(lines) => {
                 let axis = axis.to_owned();
                 return lines.note(Sign::Progress {

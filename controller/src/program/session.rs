@@ -46,13 +46,22 @@ impl Session {
         }
         let store = loaded.config.machine.store();
         let lease = Lease::take(&store, verb)?;
+        output.detail(|| {
+            let root = store.root().display();
+            let file = args.config.display();
+            format!("{file} was read; records are in {root}, which this process has now")
+        });
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();
         let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
+        output.detail(|| {
+            let names: Vec<String> = assemble::ports(&loaded.config).into_keys().collect();
+            format!("{}: open, nothing was sent yet", names.join(", "))
+        });
         let transport = recorded(transport, args, &loaded)?;
         let mut machine = Machine::new(&loaded, transport);
         machine.in_real_time();
-        machine.observe(Box::new(Bars::new(output.is_json())));
+        machine.observe(Box::new(output.bars(Bars::new)));
         stop_on_signals(&machine.stop_request())?;
         Ok(Self {
             machine,

@@ -3,7 +3,7 @@
 use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Figures, Means, OneWayFigures};
 use compensator::screw::ScrewModel;
-use units::{Approach, Metres};
+use units::{Approach, Metres, Several};
 
 use crate::config::MachineConfig;
 use crate::linear::settings;
@@ -122,9 +122,14 @@ pub(crate) fn lack(conformity: &Conformity) -> Option<String> {
         targets,
         targets_wanted,
     } = conformity;
-    let few_runs = format!("{runs} runs from each side, the standard requires {runs_wanted}");
-    let few_targets =
-        format!("{targets} targets, the standard requires {targets_wanted} over this range");
+    let few_runs = format!(
+        "{} from each side, the standard requires {runs_wanted}",
+        Several(*runs, "run")
+    );
+    let few_targets = format!(
+        "{}, the standard requires {targets_wanted} over this range",
+        Several(*targets, "target")
+    );
     let lacks: Vec<String> = [
         (runs < runs_wanted, few_runs),
         (targets < targets_wanted, few_targets),

@@ -62,7 +62,7 @@ pub(crate) enum Cut {
     /// Somebody stopped it; where what it measured is kept.
     Stopped(Option<PathBuf>),
     Failed,
-    /// It shows that the calibration makes the machine worse.
+    /// It shows that the machine is worse with the calibration.
     Worse,
 }
 
@@ -97,16 +97,17 @@ impl Made {
         let is_in_use = used.iter().all(|it| *it);
         let next = match (cut, is_in_use) {
             // Nobody is led to use it; what to look for is in the failure.
-            (Cut::Worse, _) => Vec::new(),
+            (Cut::Worse, _) => self.made_again(of),
             (Cut::Stopped(_) | Cut::Failed, false) => self.all_the_same(of),
             (Cut::Stopped(journal), true) => self.verified_later(journal.is_some(), of),
             (Cut::Failed, true) => self.verified_later(false, of),
         };
+        let in_place = self.used_in_place(cut);
         let mut told = self.told;
         told.text += match cut {
             Cut::Stopped(_) => "\nNOT VERIFIED: its verification was stopped",
             Cut::Failed => "\nNOT VERIFIED: its verification failed",
-            Cut::Worse => "\nNOT GOOD: its verification shows that it makes the machine worse",
+            Cut::Worse => "\nNOT GOOD: its verification shows that the machine is worse with it",
         };
         let mut stored = Vec::new();
         for ((pointer, id), is_used) in self.stored.iter().zip(used) {
@@ -119,6 +120,7 @@ impl Made {
             );
             stored.push(json!({"of": pointer, "calibration": id, "path": path, "in_use": is_used}));
         }
+        told.text += &in_place;
         for (command, what) in &next {
             told.text += &format!("\n  `{command}` {what}");
         }
@@ -141,6 +143,41 @@ impl Made {
             "next": commands,
         });
         told
+    }
+
+    /// What is in use in place of what makes the machine worse.
+    fn used_in_place(&self, cut: &Cut) -> String {
+        if *cut != Cut::Worse {
+            return String::new();
+        }
+        let lines = self.stored.iter().map(|(pointer, id)| {
+            let active = self.store.active(pointer).ok();
+            match active.and_then(|it| it.current).filter(|it| it != id) {
+                Some(earlier) => format!("\n  {pointer}: {} is in use again", short(&earlier)),
+                None => format!("\n  {pointer}: NOTHING is in use: moves are not corrected"),
+            }
+        });
+        lines.collect()
+    }
+
+    /// How to see that the machine is as good as before, and how to calibrate again.
+    fn made_again(&self, of: (&Path, Option<&str>)) -> Next {
+        let mut all = self.stored.iter();
+        let is_any = all.all(|(pointer, id)| {
+            let active = self.store.active(pointer).ok();
+            let used = active.and_then(|it| it.current);
+            used.is_some_and(|it| it != *id)
+        });
+        let verify = (
+            verify_of(of),
+            "shows whether what is in use again is still good",
+        );
+        let calibrate = (
+            format!("{} --verify", words_of("calibrate", of)),
+            "calibrates again, once the cause is mended",
+        );
+        let verify = is_any.then_some(verify).into_iter();
+        verify.chain([calibrate]).collect()
     }
 
     /// How what is not used is used all the same, and verified.
@@ -176,9 +213,13 @@ impl Made {
     }
 }
 
-fn verify_of((config, axis): (&Path, Option<&str>)) -> String {
+fn verify_of(of: (&Path, Option<&str>)) -> String {
+    words_of("verify", of)
+}
+
+fn words_of(verb: &str, (config, axis): (&Path, Option<&str>)) -> String {
     let axis = axis.map_or(String::new(), |it| format!(" --axis {it}"));
-    format!("truestage verify {}{axis}", config.display())
+    format!("truestage {verb} {}{axis}", config.display())
 }
 
 /// Whether what was made is used, in the words of its kind: `what` is made ready.
@@ -311,6 +352,12 @@ mod tests {
         assert!(it.text.contains("NOT GOOD"), "{}", it.text);
         assert!(!it.text.contains("cal activate"), "{}", it.text);
         assert_eq!(it.value["verification"]["ended"], "worse");
-        assert_eq!(it.value["verification"]["next"], json!([]));
+        let before = format!("x: {} is in use again", short(&first));
+        assert!(it.text.contains(&before), "{}", it.text);
+        let commands = json!([
+            "truestage verify m.toml --axis x",
+            "truestage calibrate m.toml --axis x --verify"
+        ]);
+        assert_eq!(it.value["verification"]["next"], commands);
     }
 }

@@ -110,7 +110,7 @@ impl PlacesBudgetRecord {
                 sensitivities: sensitivities.clone(),
                 u_si: combined.standard_uncertainty.value(),
                 expanded_u_si: combined.expanded().value(),
-                degrees_of_freedom: combined.degrees_of_freedom,
+                degrees_of_freedom: told_freedom(combined.degrees_of_freedom),
             }
         });
         Self {
@@ -179,8 +179,10 @@ const NAME_MAX: usize = 200;
 const SENSITIVITY: Limits = limits(-1e12, 1e12, "SI units per unit");
 /// Where a place is.
 const AT: Limits = limits(-1e3, 1e3, "m or rad");
-/// How well an uncertainty is known.
-pub(crate) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, 1e12, "degrees of freedom");
+/// How well an uncertainty is known. Of what is small beside the rest they may be any number (Welch and Satterthwaite).
+pub(crate) const FREEDOM: Limits = limits(f64::MIN_POSITIVE, f64::MAX, "degrees of freedom");
+/// So many are as good as infinitely many: no coverage factor tells them apart.
+const FREEDOM_MANY: f64 = 1e6;
 /// A figure that follows from others may differ by rounding: where an uncertainty is computed once as a whole and once part by
 /// part, of equations as badly conditioned as they may be, far more than a digit of it.
 pub(crate) const ROUNDING: f64 = 1e-6;
@@ -217,10 +219,15 @@ pub(crate) fn same(place: &str, seen: f64, expected: f64) -> Judged {
     is(place, agrees, follows, || format!("{seen:e}"))
 }
 
-/// Likewise of degrees of freedom.
+/// Effective degrees of freedom as they are stored and told: `None` where they are as good as infinitely many.
+pub(crate) fn told_freedom(effective: Option<f64>) -> Option<f64> {
+    effective.filter(|it| *it < FREEDOM_MANY)
+}
+
+/// Likewise of degrees of freedom: those as good as infinitely many are the same, however they are written.
 pub(crate) fn same_freedom(place: &str, (seen, expected): (Option<f64>, Option<f64>)) -> Judged {
-    let infinite = |it: Option<f64>| it.unwrap_or(f64::MAX);
-    same(place, infinite(seen), infinite(expected))
+    let many = |it: Option<f64>| it.map_or(FREEDOM_MANY, |it| it.min(FREEDOM_MANY));
+    same(place, many(seen), many(expected))
 }
 
 impl From<&Contribution> for ContributionRecord {
@@ -305,6 +312,16 @@ mod tests {
         let budget = PlacesBudget::<Metres>::new(lines, vec![vec![1.0, 2.0], vec![1.0, 0.0]]);
         let places = vec![(vec![0.0], Some(Approach::Forward)), (vec![0.1], None)];
         PlacesBudgetRecord::new(&budget.unwrap(), places)
+    }
+
+    #[test]
+    fn more_degrees_of_freedom_than_matter_are_infinitely_many_however_they_are_written() {
+        assert_eq!(told_freedom(Some(1.36e12)), None);
+        assert_eq!(told_freedom(Some(17.5)), Some(17.5));
+        for written in [None, Some(1e6), Some(1.36e12), Some(1e300)] {
+            same_freedom("it", (written, Some(1.4e12))).unwrap();
+            assert!(same_freedom("it", (written, Some(8.0))).is_err());
+        }
     }
 
     #[test]

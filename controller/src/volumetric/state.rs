@@ -189,8 +189,9 @@ impl WorkVolume<'_> {
                 return Err(StoreError::Foreign {
                     id: short(id),
                     what: "a drive of the three axes",
-                    expected: text(expected),
-                    seen: text(seen),
+                    expected: text(expected).into(),
+                    seen: text(seen).into(),
+                    instead: None,
                 });
             }
         }

@@ -22,7 +22,7 @@ use wire::can::worst_case_bits;
 /// let error = four_axes(1).load().expect_err("8 PDOs of 135 bits and a SYNC of 55");
 /// assert_eq!(
 ///     error.to_string(),
-///     "bus load 114 % (limit 80 %): SYNC and PDOs take 1.135ms of every 1ms; \
+///     "bus load 114 % (limit 80 %): SYNC and PDOs of each SYNC period take 1.135ms, and it has 1ms; \
 ///      a SYNC period of 1.419ms would fit"
 /// );
 /// assert!((four_axes(2).load()?.load - 0.5675).abs() < 1e-9);
@@ -181,7 +181,7 @@ pub struct BusLoad {
 pub enum BusLoadError {
     /// Too much for the SYNC period.
     #[error(
-        "bus load {:.0} % (limit {:.0} %): SYNC and PDOs take {cyclic:?} of every {period:?}; \
+        "bus load {:.0} % (limit {:.0} %): SYNC and PDOs of each SYNC period take {cyclic:?}, and it has {period:?}; \
          a SYNC period of {shortest_period:?} would fit",
         load * 100.0, limit * 100.0
     )]
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(shortest_period, Duration::from_micros(1419));
         assert_eq!(
             error.to_string(),
-            "bus load 114 % (limit 80 %): SYNC and PDOs take 1.135ms of every 1ms; \
+            "bus load 114 % (limit 80 %): SYNC and PDOs of each SYNC period take 1.135ms, and it has 1ms; \
              a SYNC period of 1.419ms would fit"
         );
     }

@@ -182,7 +182,7 @@ fn what_cannot_be_opened_says_why() {
     };
     let text = error.to_string();
     assert!(
-        text.contains("/dev/no-such-line") && text.contains("does not exist"),
+        text.contains("/dev/no-such-line: No such file or directory; `ls"),
         "{text}"
     );
     let settings = SlcanSettings::new(123_456);

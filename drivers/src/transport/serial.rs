@@ -129,7 +129,7 @@ fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
             "no permission; add the user to the group of the device (often `dialout`)"
         }
-        Err(_) => "does not exist; `ls /dev/serial/by-id` lists what is plugged in",
+        Err(_) => "`ls /dev/serial/by-id` lists what is plugged in",
         Ok(_) if std::fs::File::open(path).is_err_and(|e| is_denied(&e)) => {
             "no permission; add the user to the group of the device (often `dialout`)"
         }

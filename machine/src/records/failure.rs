@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::SCHEMA_VERSION;
 use super::sound::Unsound;
+use super::{SCHEMA_VERSION, short};
 
 /// Why a model cannot be made of what was stored.
 pub type ModelError = Box<dyn core::error::Error + Send + Sync>;
@@ -12,7 +12,7 @@ pub type ModelError = Box<dyn core::error::Error + Send + Sync>;
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The operating system refused.
-    #[error("{}: cannot {action}: {source}; the files already stored are untouched", path.display())]
+    #[error("{}: cannot {action}: {source}{}", path.display(), untouched(action))]
     Io {
         /// What was tried.
         action: &'static str,
@@ -70,8 +70,8 @@ pub enum StoreError {
     },
     /// The calibration belongs to another machine or another set-up of this one.
     #[error(
-        "calibration {id}: {what} is `{expected}` there, but `{seen}` here; the calibration is \
-         refused on this machine: calibrate again"
+        "calibration {id}: {what} is `{}` there, but `{}` here; the calibration is refused on this machine: {}",
+        brief(expected), brief(seen), instead_of(instead.as_deref())
     )]
     Foreign {
         /// The calibration.
@@ -79,9 +79,11 @@ pub enum StoreError {
         /// What differs.
         what: &'static str,
         /// What the calibration says.
-        expected: String,
+        expected: Box<str>,
         /// What this machine is.
-        seen: String,
+        seen: Box<str>,
+        /// The newest calibration that would fit, if it is known that there is one.
+        instead: Option<Box<str>>,
     },
     /// The calibration holds another kind of model than is needed.
     #[error(
@@ -121,7 +123,10 @@ pub enum StoreError {
         count: usize,
     },
     /// There is nothing to go back to.
-    #[error("axis {axis}: no earlier calibration to roll back to")]
+    #[error(
+        "axis {axis}: no earlier calibration to roll back to; one that makes an axis worse is not gone back to. `truestage \
+         cal list` shows all that are stored, `truestage cal activate` uses any of them"
+    )]
     NoEarlier {
         /// Which axis.
         axis: String,
@@ -185,6 +190,38 @@ pub(super) fn unsound(path: &Path, line: Option<usize>) -> impl FnOnce(Unsound) 
         place: it.place,
         expected: it.expected,
         seen: it.seen,
+    }
+}
+
+/// What a failed writing leaves.
+fn untouched(action: &str) -> &'static str {
+    match action {
+        // Nothing was to be written.
+        "read" | "list" => "",
+        _ => "; the files already stored are untouched",
+    }
+}
+
+/// Digits of a hash.
+const HASH: usize = 64;
+
+/// Of a hash as much as tells it from others.
+fn brief(value: &str) -> String {
+    match value.len() == HASH && value.bytes().all(|it| it.is_ascii_hexdigit()) {
+        true => short(value),
+        false => value.to_owned(),
+    }
+}
+
+/// What to do where a calibration is another machine's, or was made with another configuration.
+fn instead_of(id: Option<&str>) -> String {
+    match id {
+        Some(id) => format!(
+            "`truestage cal activate` with {} uses the newest one that was made with this configuration; or calibrate \
+             again",
+            short(id)
+        ),
+        None => "use one that was made with this configuration (`truestage cal list`), or calibrate again".into(),
     }
 }
 

@@ -81,8 +81,9 @@ impl RecordHead {
                 return Err(StoreError::Foreign {
                     id: short(id),
                     what,
-                    expected,
-                    seen,
+                    expected: expected.into(),
+                    seen: seen.into(),
+                    instead: None,
                 });
             }
         }

@@ -17,6 +17,10 @@ pub fn sealed(json: &str) -> String {
     format!("{members}{comma}{KEY}{checksum:08x}\"}}\n")
 }
 
+/// Of what is no line of a journal.
+const NO_CHECKSUM: &str =
+    "no checksum, which each line of a journal has (`runs/*.jsonl` of a machine's records)";
+
 /// The entry of a line, whose checksum is right. Lines of earlier programs have it in front.
 ///
 /// # Errors
@@ -26,7 +30,7 @@ pub fn opened(line: &str) -> Result<String, String> {
         true => inside(line)?,
         false => in_front(line)?,
     };
-    let expected = u32::from_str_radix(digits, 16).map_err(|error| error.to_string())?;
+    let expected = u32::from_str_radix(digits, 16).map_err(|_| NO_CHECKSUM)?;
     let seen = crc32fast::hash(json.as_bytes());
     match seen == expected {
         true => Ok(json),
@@ -35,7 +39,7 @@ pub fn opened(line: &str) -> Result<String, String> {
 }
 
 fn inside(line: &str) -> Result<(String, &str), String> {
-    let (members, checksum) = line.rsplit_once(KEY).ok_or("no checksum")?;
+    let (members, checksum) = line.rsplit_once(KEY).ok_or(NO_CHECKSUM)?;
     let digits = checksum.strip_suffix("\"}").filter(|it| it.len() == DIGITS);
     let digits = digits.ok_or("no whole checksum at the end")?;
     let members = members.strip_suffix(',').unwrap_or(members);
@@ -43,7 +47,7 @@ fn inside(line: &str) -> Result<(String, &str), String> {
 }
 
 fn in_front(line: &str) -> Result<(String, &str), String> {
-    let (digits, json) = line.split_once(' ').ok_or("no checksum")?;
+    let (digits, json) = line.split_once(' ').ok_or(NO_CHECKSUM)?;
     Ok((json.to_owned(), digits))
 }
 
@@ -72,6 +76,13 @@ mod tests {
     fn a_line_of_an_earlier_program_is_opened() {
         let line = format!("{:08x} {ENTRY}", crc32fast::hash(ENTRY.as_bytes()));
         assert_eq!(opened(&line).unwrap(), ENTRY);
+    }
+
+    #[test]
+    fn what_is_no_line_of_a_journal_is_told_so() {
+        for line in ["# A machine.", "[machine]", "{}", "name = \"x\""] {
+            assert_eq!(opened(line).unwrap_err(), NO_CHECKSUM, "{line}");
+        }
     }
 
     #[test]

@@ -309,11 +309,23 @@ impl Store {
     /// # Errors
     /// When the pointer cannot be read or written.
     pub fn retire(&self, axis: &str) -> Result<Option<String>, StoreError> {
+        self.retire_to(axis, |_| true)
+    }
+
+    /// Likewise, passing over what is not `usable` now. Where nothing is, all of it stays in the history: it can be
+    /// gone back to once it is usable again.
+    ///
+    /// # Errors
+    /// As [`Store::retire`].
+    pub fn retire_to(
+        &self,
+        axis: &str,
+        mut usable: impl FnMut(&str) -> bool,
+    ) -> Result<Option<String>, StoreError> {
         let mut pointer = self.active(axis)?;
-        pointer.current = None;
-        while let (None, Some(earlier)) = (&pointer.current, pointer.history.pop()) {
-            pointer.current = Some(earlier).filter(|id| self.glance(id).is_ok());
-        }
+        let mut is_good = |id: &String| self.glance(id).is_ok() && usable(id);
+        let newest = pointer.history.iter().rposition(&mut is_good);
+        pointer.current = newest.and_then(|at| pointer.history.drain(at..).next());
         self.write_pointer(axis, &pointer)?;
         Ok(pointer.current)
     }

@@ -4,7 +4,7 @@ use compensator::budget::{AxisBudget, BudgetError, COVERAGE_FACTOR, Combined};
 use serde::{Deserialize, Serialize};
 use units::{Approach, Metres};
 
-use crate::store::budget::ContributionRecord;
+use crate::store::budget::{ContributionRecord, told_freedom};
 
 /// What makes the deviations uncertain, and what that comes to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -84,7 +84,7 @@ impl From<&Combined> for CombinedRecord {
         Self {
             u_m: it.standard_uncertainty.value(),
             expanded_u_m: it.expanded().value(),
-            degrees_of_freedom: it.degrees_of_freedom,
+            degrees_of_freedom: told_freedom(it.degrees_of_freedom),
         }
     }
 }

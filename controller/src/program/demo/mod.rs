@@ -72,8 +72,8 @@ fn on_stand(
     loaded.patience = patience;
     let mut machine = Machine::new(&loaded, transport);
     let bars = match args.speed {
-        None => Bars::of_demonstration(output.is_json()),
-        Some(_) => Bars::new(output.is_json()),
+        None => output.bars(Bars::of_demonstration),
+        Some(_) => output.bars(Bars::new),
     };
     machine.observe(Box::new(bars));
     stop_on_signals(&machine.stop_request())?;

@@ -11,8 +11,9 @@ pub(super) const fn of(code: u8) -> Option<(&'static str, Advice)> {
         0 => (
             "done",
             Advice {
-                cause: "what was asked for has been done, and the result is within its tolerance",
-                next: "nothing is left to do",
+                cause: "what was asked for has been done. What was judged is within its tolerance; a measurement as found \
+                        (`verify --uncompensated`) and figures of a file (`iso230`) are results, and not judged",
+                next: "read the result: it says NOT WITHIN where a stage as found is beyond the tolerance",
             },
         ),
         2 => (

@@ -65,7 +65,7 @@ impl<'a> Intent<'a> {
 /// One thing that is going to happen, or that it depends upon.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// `zero`, `calibration`, `calibrate`, `verify` or `move`.
+    /// `zero`, `calibration`, `calibrate`, `verify`, `move` or `jog`.
     what: &'static str,
     /// Whose: an axis, or all of them by what they are.
     whose: String,
@@ -88,7 +88,7 @@ impl Step {
 
     /// Whether something is driven.
     pub(crate) fn moves(&self) -> bool {
-        matches!(self.what, "zero" | "move")
+        matches!(self.what, "zero" | "move" | "jog")
     }
 
     /// For people.

@@ -13,7 +13,7 @@ impl Heard {
     /// Tells what `run` has said since.
     pub(super) fn tell(&mut self, run: &Value, output: Output) {
         for text in self.news(run) {
-            output.note(&format!("> {}", plain(&text)));
+            output.must_say(&format!("> {}", plain(&text)));
         }
     }
 

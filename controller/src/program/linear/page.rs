@@ -35,6 +35,7 @@ pub(crate) fn section<'a>(
     let title = match (journal.header.verb.as_str(), is_corrected) {
         ("verify", true) => "as left",
         ("verify", false) => "as found",
+        ("calibrate", _) => "at the calibrated positions",
         (other, _) => other,
     };
     Section {

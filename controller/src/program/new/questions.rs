@@ -14,15 +14,15 @@ use crate::program::output::Output;
 
 /// Which of the machines that ship is most like his.
 pub(super) fn which(output: Output) -> Result<Example, Failure> {
-    output.note("Which machine is yours most like?");
+    output.must_say("Which machine is yours most like?");
     for it in Example::value_variants() {
-        output.note(&format!("  {:<12} {}", it.name, it.help));
+        output.must_say(&format!("  {:<12} {}", it.name, it.help));
     }
     loop {
         let typed = answer().ok_or_else(nobody)?;
         match Example::from_str(&typed, true) {
             Ok(which) => return Ok(which),
-            Err(_) => output.note(&format!("`{typed}` is none of them")),
+            Err(_) => output.must_say(&format!("`{typed}` is none of them")),
         }
     }
 }
@@ -40,7 +40,7 @@ enum Asked {
 /// Asks for what every machine has another of: once, and what a scan finds not at all. Then for what does not fit
 /// the answers, until all of it fits, or nobody has a better answer.
 pub(super) fn ask(draft: &mut Draft, output: Output) -> Result<(), Failure> {
-    output.note(
+    output.must_say(
         "Enter leaves the example's value, in brackets, marked FILL IN. A CAN interface of the kernel is told by --port \
          can0=socketcan:can0.",
     );
@@ -65,7 +65,7 @@ fn ask_again(draft: &mut Draft, output: Output) -> Asked {
         return ended;
     };
     for it in &findings {
-        output.note(&format!("{}: {}; {}", it.key, it.cause, it.help));
+        output.must_say(&format!("{}: {}; {}", it.key, it.cause, it.help));
         let place = draft.at(&it.key);
         let Some(place) = place.or_else(|| draft.at(&key_on(&text, it.line)?)) else {
             continue;
@@ -102,7 +102,7 @@ fn put(draft: &mut Draft, place: &Place, output: Output) -> Asked {
         value,
         explained,
     } = place;
-    output.note(&format!("{path} [{value}]: {}", explained.text));
+    output.must_say(&format!("{path} [{value}]: {}", explained.text));
     loop {
         let Some(typed) = answer() else {
             return Asked::Over;
@@ -113,7 +113,7 @@ fn put(draft: &mut Draft, place: &Place, output: Output) -> Asked {
         let mut tried = draft.clone();
         tried.set(path, &typed);
         match wrong(&tried, path) {
-            Some(it) => output.note(&format!("{}; {}", it.cause, it.help)),
+            Some(it) => output.must_say(&format!("{}; {}", it.cause, it.help)),
             None => {
                 *draft = tried;
                 return Asked::Answered;

@@ -165,7 +165,10 @@ fn verdict_of(is_complete: bool, judged: Option<(String, bool)>) -> (String, boo
     match judged {
         Some(judged) if is_complete => judged,
         Some(_) => ("NOT JUDGED: the run did not come to its end".into(), false),
-        None => ("nothing is judged in this run".into(), true),
+        None => (
+            "this run measures and judges nothing; a verification does".into(),
+            true,
+        ),
     }
 }
 

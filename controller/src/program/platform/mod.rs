@@ -40,6 +40,7 @@ pub(crate) const VERBS: Verbs = Verbs {
     verify: verbs::verify,
     move_to: verbs::move_to,
     jog: Jogs {
+        check: verbs::check_jog,
         run: verbs::jog,
         purpose: Use::Measurement,
         zeroed: Some(PLATFORM),

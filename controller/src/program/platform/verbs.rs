@@ -344,9 +344,13 @@ fn pose_value(pose: Pose) -> Value {
     })
 }
 
+pub(crate) fn check_jog(machine: &mut Machine, jog: &Jog) -> Result<(), Failure> {
+    let pose_jog = PoseJog::new(&jog.axis, jog.speed)?;
+    machine.platform()?.check_jog(pose_jog)
+}
+
 pub(crate) fn jog(machine: &mut Machine, store: &Store, jog: &Jog) -> Result<Jogged, Failure> {
     let pose_jog = PoseJog::new(&jog.axis, jog.speed)?;
-    machine.platform()?.check_jog(pose_jog)?;
     machine.start()?;
     machine.platform()?.zero(store)?;
     machine.platform()?.jog(pose_jog, jog.duration)

@@ -20,6 +20,7 @@ use crate::program::data_text::{is_journal, name_of, read};
 use crate::program::output::{Ended, Output};
 use crate::program::page::chart::BLUE;
 use crate::program::page::compare::{Pair, overlaid};
+use crate::program::plausible;
 use crate::program::rotary::{json as to_json, uncertainty};
 use crate::program::show::{Changes, Show};
 use crate::rotary::PlateLog;
@@ -154,7 +155,9 @@ pub(crate) fn fit(args: &RotaryArgs, output: Output) -> Ended {
         return of_journal(args, output);
     }
     let file = name_of(&args.data);
-    let series = RotarySeries::from_csv(&read(&args.data)?, &file, args.lines)?;
+    let text = read(&args.data)?;
+    let series = RotarySeries::from_csv(&text, &file, args.lines)?;
+    plausible::plate(&text, &file)?;
     let options = SolveOptions {
         reading_noise: args.reading_noise_arcsec.map(noise).transpose()?,
         amplification_max: args.amplification_limit,

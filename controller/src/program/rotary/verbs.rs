@@ -186,9 +186,13 @@ fn calibration_of(
     Ok(id)
 }
 
+pub(crate) fn check_jog(machine: &mut Machine, jog: &Jog) -> Result<(), Failure> {
+    let speed = round(&jog.axis, jog.speed)?;
+    machine.rotary(&jog.axis)?.check_jog(speed)
+}
+
 pub(crate) fn jog(machine: &mut Machine, _: &Store, jog: &Jog) -> Result<Jogged, Failure> {
     let speed = round(&jog.axis, jog.speed)?;
-    machine.rotary(&jog.axis)?.check_jog(speed)?;
     machine.start()?;
     machine.rotary(&jog.axis)?.zero()?;
     machine.rotary(&jog.axis)?.jog(speed, jog.duration)

@@ -131,7 +131,7 @@ fn machines() -> Vec<Form> {
         )
         .counted(),
     ];
-    forms.extend(["zero", "calibrate", "verify", "move"].map(dry_run));
+    forms.extend(["zero", "calibrate", "verify", "move", "jog"].map(dry_run));
     let untold = [
         "zero",
         "calibrate",
@@ -148,7 +148,7 @@ fn machines() -> Vec<Form> {
 }
 
 fn dry_run(verb: &'static str) -> Form {
-    let what = word(&["zero", "calibration", "calibrate", "verify", "move"]);
+    let what = word(&["zero", "calibration", "calibrate", "verify", "move", "jog"]);
     let step = object([
         ("what", what),
         (

@@ -106,6 +106,64 @@ fn rollback_returns_to_the_one_before() {
 }
 
 #[test]
+fn what_is_passed_over_when_one_is_retired_can_still_be_gone_back_to() {
+    let (_folder, store) = store();
+    let ids = ["A", "B", "C"].map(|serial| {
+        let id = store.save(&record(serial)).unwrap();
+        store.activate("x", &id).unwrap();
+        id
+    });
+    assert_eq!(store.retire_to("x", |_| false).unwrap(), None);
+    let pointer = store.active("x").unwrap();
+    assert_eq!((pointer.current, &pointer.history[..]), (None, &ids[..2]));
+    assert_eq!(store.rollback("x").unwrap(), ids[1]);
+    store.activate("x", &ids[2]).unwrap();
+    let oldest = store.retire_to("x", |id| id == ids[0]).unwrap();
+    assert_eq!(oldest.as_ref(), Some(&ids[0]));
+    let told = store.rollback("x").unwrap_err().to_string();
+    assert!(
+        told.contains("no earlier") && told.contains("cal activate"),
+        "{told}"
+    );
+}
+
+#[test]
+fn only_a_failed_writing_says_that_what_is_stored_is_untouched() {
+    let (folder, store) = store();
+    let gone = store.glance("0123").unwrap_err().to_string();
+    assert!(!gone.contains("untouched"), "{gone}");
+    std::fs::write(folder.path().join("m"), b"").unwrap();
+    let refused = store.save(&record("A")).unwrap_err().to_string();
+    assert!(refused.contains("untouched"), "{refused}");
+}
+
+#[test]
+fn hashes_that_differ_are_told_by_their_beginnings_with_what_to_do() {
+    let hash = |digit: &str| digit.repeat(64);
+    let foreign = |instead: Option<String>| {
+        let error = StoreError::Foreign {
+            id: "id".into(),
+            what: "the configuration's hash",
+            expected: hash("a").into(),
+            seen: hash("b").into(),
+            instead: instead.map(Into::into),
+        };
+        error.to_string()
+    };
+    let told = foreign(None);
+    let hashes = format!("`{}` there, but `{}` here", "a".repeat(12), "b".repeat(12));
+    assert!(
+        told.contains(&hashes) && told.contains("`truestage cal list`"),
+        "{told}"
+    );
+    let told = foreign(Some(hash("c")));
+    assert!(
+        told.contains("`truestage cal activate` with cccccccccccc"),
+        "{told}"
+    );
+}
+
+#[test]
 fn a_file_from_a_newer_program_is_refused() {
     let (_folder, store) = store();
     let path = store.pointer_path("x");
