@@ -49,10 +49,7 @@ pub(super) fn understood(said: &[u8]) -> (StopMode, Option<String>) {
         Some(Err(error)) => (StopMode::default(), vec![format!("`mode`: {error}")]),
     };
     if !members.is_empty() {
-        let count = members.len();
-        unclear.push(format!(
-            "{count} members beside `mode`, which a stop does not have"
-        ));
+        unclear.push("what else it says beside `mode`, which a stop does not have".to_owned());
     }
     let warning = (!unclear.is_empty()).then(|| unclear.join("; "));
     (mode, warning)
