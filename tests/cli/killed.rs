@@ -11,7 +11,7 @@ use tests::{Edit, Rig, VOLUMETRIC, random};
 
 use crate::held::Steps;
 use crate::programs::{Bench, Process, check_error, live_rigs, number};
-use crate::serve::{ask, keep};
+use crate::serve::{ask, fetch, keep};
 use crate::volumetric_live::small;
 
 /// `watch_master_ms`, the heartbeat before it that was not sent any more, and what braking takes.
@@ -148,6 +148,14 @@ fn what_a_killed_service_left_in_motion_is_stopped_by_one_that_comes_at_once() {
         );
         let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
         assert_eq!(axis["state"], "Disabled", "{axis:#}");
+        let (_, counted) = fetch(bench.folder(), "GET /metrics", &json!({}));
+        let by_the_start = counted
+            .lines()
+            .find(|it| it.contains("found enabled, and stopped"));
+        assert!(
+            by_the_start.is_some_and(|it| it.ends_with(" 1")),
+            "{by_the_start:?}"
+        );
         service.signal(Signal::SIGTERM);
         assert_eq!(service.end().code, Some(0));
     }

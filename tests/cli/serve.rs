@@ -18,7 +18,7 @@ pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
 }
 
 /// The status of an answer, and its body as it is.
-fn fetch(folder: &Path, request: &str, body: &Value) -> (u16, String) {
+pub(crate) fn fetch(folder: &Path, request: &str, body: &Value) -> (u16, String) {
     let mut stream = UnixStream::connect(folder.join(SOCKET)).expect("it listens");
     let body = body.to_string();
     let length = body.len();

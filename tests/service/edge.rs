@@ -162,6 +162,25 @@ fn a_stop_does_not_wait_for_a_body_that_does_not_come() {
     });
 }
 
+/// A controller of another kind sends its order and closes its end.
+#[test]
+fn a_stop_of_whoever_closes_his_end_at_once_is_carried_out() {
+    on_a_stage(|_, http| {
+        for _ in 0..5 {
+            let id = http
+                .plan(&Caller::named("anna"), &RunRequest::of(RunKind::Zero, None))
+                .unwrap();
+            let mut stream = UnixStream::connect(http.socket()).unwrap();
+            stream
+                .write_all(b"POST /v1/stop HTTP/1.1\r\nhost: x\r\n\r\n")
+                .unwrap();
+            drop(stream);
+            let run = http.run(&id, PATIENCE).unwrap();
+            assert_eq!(run.state, RunState::Stopped, "{run:?}");
+        }
+    });
+}
+
 #[test]
 fn a_page_from_elsewhere_cannot_move_a_stage() {
     on_a_stage(|stage, _| {

@@ -78,7 +78,7 @@ impl<'a> Judge<'a> {
         if !table.contains_key(name) {
             let names: Vec<&str> = table.keys().map(String::as_str).collect();
             let known = match names.is_empty() {
-                true => format!("there is none: add a section for a {kind}"),
+                true => "there is none yet: add a section for it".to_owned(),
                 false => format!("known: {}", names.join(", ")),
             };
             let help = match word_meant(name, &names) {

@@ -92,7 +92,7 @@ pub(super) fn of_lines(line: &str, whole: &str, end: End, count: usize) -> Slip 
         return Slip::new(parts.value_at, cause, help.into(), None);
     }
     let cause = format!("the {what} that begins here does not end");
-    let help = format!("write {mark} behind its last entry");
+    let help = format!("write {mark} at its end");
     let value = parts.value.unwrap_or_default().trim_end_matches([',', ' ']);
     let meant = parts.with(&format!("{value}{mark}"));
     let meant = (count == 1 && is_toml(&meant)).then_some(meant);
@@ -232,7 +232,9 @@ fn heading(parts: &Parts<'_>) -> Option<Slip> {
     let help =
         format!("write `{meant}`: a section's name stands in brackets, its parts with points");
     let at = parts.said.len() - parts.said.trim_start().len();
-    Some(Slip::new(at, cause, help, Some(meant)))
+    // Other brackets may be those of a remark: what follows stays where it is.
+    let meant = line.starts_with('[').then_some(meant);
+    Some(Slip::new(at, cause, help, meant))
 }
 
 /// A second key begins where the line should end.
@@ -244,7 +246,9 @@ fn two_keys(parts: &Parts<'_>) -> Option<Slip> {
     let (before, _) = value.split_once('=')?;
     let before = before.trim_end();
     let is_name = |it: char| it.is_alphanumeric() || "_-".contains(it);
-    let begin = before.rfind(|it| !is_name(it))? + 1;
+    let mut last = before.char_indices().rev();
+    let (at, last) = last.find(|(_, it)| !is_name(*it))?;
+    let begin = at + last.len_utf8();
     let (first, second) = before.split_at(begin);
     let first = first.trim().trim_end_matches([',', ';']).trim_end();
     let meant = parts.with(first);

@@ -60,7 +60,7 @@ impl Found<'_> {
             .rev()
             .find(|(_, keys)| keys.iter().any(|it| it == key));
         home.map(|(path, _)| match path.is_empty() {
-            true => format!("`{key}` stands above all sections"),
+            true => format!("write `{key}` above all sections"),
             false => {
                 format!("`{key}` is a key of [{path}]: write it there, above the sections in it")
             }

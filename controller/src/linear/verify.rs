@@ -203,7 +203,7 @@ impl LinearStage<'_> {
         if verified.is_within_tolerance() {
             return Ok(());
         }
-        let before = before(store, self.axis, &made)?;
+        let before = self.before(store, &made)?;
         let Some(before) = before.filter(|it| it.accuracy * CLEARLY < seen) else {
             return Ok(());
         };
@@ -228,6 +228,28 @@ impl LinearStage<'_> {
             cause,
             then: in_use_text(in_use.as_deref().map(short).as_deref()),
         })))
+    }
+
+    /// How good the axis would be without `made`: as what would be in use then was last verified, or as found.
+    fn before(&self, store: &Store, made: &Untried) -> Result<Option<Before>, Failure> {
+        let found = made.as_found.map(|accuracy| Before {
+            accuracy,
+            what: "as found".into(),
+        });
+        let history = store.active(self.axis)?.history;
+        let mut newest_first = history.iter().rev();
+        let Some(earlier) = newest_first.find(|id| self.usable(store, id).is_ok()) else {
+            return Ok(found);
+        };
+        let recorded = recorded_accuracy(store, self.axis, earlier)?;
+        let recorded = recorded.map(|accuracy| Before {
+            accuracy,
+            what: format!(
+                "with calibration {} when it was last verified",
+                short(earlier)
+            ),
+        });
+        Ok(recorded.or(found))
     }
 
     /// Goes back to the newest calibration before `calibration` that fits this machine, or to
@@ -260,24 +282,6 @@ struct Before {
     accuracy: Metres,
     /// With what, in words.
     what: String,
-}
-
-/// How good the axis was before `made`: as what was in use was last verified, or as found; the better of both.
-fn before(store: &Store, axis: &str, made: &Untried) -> Result<Option<Before>, Failure> {
-    let found = made.as_found.map(|accuracy| Before {
-        accuracy,
-        what: "as found".into(),
-    });
-    let earlier = store.active(axis)?.history.pop();
-    let recorded = match &earlier {
-        None => None,
-        Some(id) => recorded_accuracy(store, axis, id)?.map(|accuracy| Before {
-            accuracy,
-            what: format!("with calibration {} when it was last verified", short(id)),
-        }),
-    };
-    let known = recorded.into_iter().chain(found);
-    Ok(known.min_by(|a, b| a.accuracy.value().total_cmp(&b.accuracy.value())))
 }
 
 /// A of the newest whole verification of `axis` with the calibration `id`; what cannot be read is passed over.

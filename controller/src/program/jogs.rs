@@ -85,11 +85,11 @@ impl Jogs {
         let speed = format!("{speed:.6}");
         let speed = speed.trim_end_matches('0').trim_end_matches('.');
         let until = match jog.duration {
-            Some(span) => format!("for {}, ", ShortSpan(span)),
-            None => "until Ctrl-C, ".to_owned(),
+            Some(span) => format!("for {}", ShortSpan(span)),
+            None => "until Ctrl-C".to_owned(),
         };
         let text = format!(
-            "at {speed} {unit} {until}and no longer than until it is {}; NOT CORRECTED: by {} alone",
+            "at {speed} {unit} {until} or until it is {}, whichever comes first; NOT CORRECTED: by {} alone",
             self.end.0, self.by
         );
         Step::new("jog", &jog.axis, text)

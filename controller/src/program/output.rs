@@ -45,7 +45,7 @@ pub(crate) struct SaidArgs {
     /// Say nothing on standard error but errors and questions.
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say on standard error, too, what is read, opened and written.
+    /// Say on standard error, too, what is read and opened.
     #[arg(long, short, global = true)]
     verbose: bool,
 }

@@ -1,7 +1,8 @@
 //! Whether the numbers of a data file can be those of a stage at all: in another unit than their columns name, all of
 //! them may agree with one another, and figures of them look like figures.
 //!
-//! The limits are such that no sound data meet them, whatever was measured: what is smaller than that is believed.
+//! The limits are such that sound data do not meet them: what is smaller than that is believed. A rack of more than 10 m may, and is
+//! judged in parts: of its numbers alone it looks like a stage of some millimetres in µm.
 
 use crate::Failure;
 
@@ -9,9 +10,9 @@ use crate::Failure;
 const TRAVEL_MM: f64 = 100e3;
 /// Beyond it somebody is asked to look.
 const LONG_TRAVEL_MM: f64 = 10e3;
-/// Deviations of a linear axis differ by less, mm: beyond that nobody calibrates, but mends.
+/// Deviations of a linear axis are nearer to the middle of all, mm: beyond that nobody calibrates, but mends.
 const DEVIATION_MM: f64 = 5.0;
-/// Deviations of the lines of one placement of a plate differ by less, arcsec.
+/// Deviations of the lines of one placement of a plate are nearer to their middle, arcsec.
 const DEVIATION_ARCSEC: f64 = 7200.0;
 
 /// A row of a file: where its last wanted cell stands, and what its wanted cells say.
@@ -51,7 +52,14 @@ fn rows(text: &str, names: &[&str]) -> Vec<Row> {
 /// The middle of some numbers; 0 of none.
 fn middle(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
+    let half = numbers.len() / 2;
+    let Some(above) = numbers.get(half) else {
+        return 0.0;
+    };
+    match numbers.len() % 2 {
+        0 => above.midpoint(numbers[half - 1]),
+        _ => *above,
+    }
 }
 
 /// The number that is farthest from the middle of all, and how far.
@@ -81,7 +89,7 @@ pub(crate) fn positions(
     [target, measured]: [&str; 2],
 ) -> Result<Option<String>, Failure> {
     let rows = rows(text, &[target, measured]);
-    let help = "are both columns in µm, or in inches? Convert their values to mm";
+    let help = "are both columns in µm, or in inches? Convert their values to mm; give a rack of more than 10 m in parts";
     let targets = || rows.iter().map(|it| it.cells[0]);
     let (low, high) = (targets().reduce(f64::min), targets().reduce(f64::max));
     let travel = high.unwrap_or(0.0) - low.unwrap_or(0.0);
@@ -97,7 +105,7 @@ pub(crate) fn positions(
             "`{measured}` − `{target}` is {:.3} mm, {off:.3} mm from the middle of all",
             deviations[at]
         );
-        let expected = format!("deviations within {DEVIATION_MM} mm of one another");
+        let expected = format!("deviations within {DEVIATION_MM} mm of their middle");
         return Err(refused(file, &rows[at], &seen, &expected, help));
     }
     let doubt = (travel > LONG_TRAVEL_MM).then(|| {
@@ -127,7 +135,7 @@ pub(crate) fn plate(text: &str, file: &str) -> Result<(), Failure> {
                     "`deviation_arcsec` is {}, {off:.0}″ from the middle of its placement",
                     deviations[at]
                 ),
-                &format!("deviations within {DEVIATION_ARCSEC}″ of one another"),
+                &format!("deviations within {DEVIATION_ARCSEC}″ of their middle"),
                 "is the column in µrad, or in parts of a second? Convert its values to seconds of arc",
             )),
         }

@@ -1,5 +1,6 @@
 //! One place, served by a thread of its own with a tokio runtime of its own.
 
+use core::convert::Infallible;
 use core::pin::pin;
 use core::time::Duration;
 use std::io;
@@ -8,6 +9,10 @@ use std::thread::{self, JoinHandle};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ConnectInfo;
+use axum::http::{Method, StatusCode};
+use axum::response::{IntoResponse as _, Response};
+use futures_util::FutureExt as _;
+use futures_util::future::Either;
 use hyper::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
@@ -139,6 +144,16 @@ async fn serve(mut door: Door, app: Router, mut closing: Closing, open: Open) {
     }
 }
 
+/// An order is carried out also for whoever closes his end at once: what is awaited for him is let go of then, and a stop
+/// must not be.
+fn carried_out(
+    answering: impl Future<Output = Result<Response, Infallible>> + Send + 'static,
+) -> impl Future<Output = Result<Response, Infallible>> {
+    let answering = tokio::spawn(answering);
+    let failed = |_| Ok(StatusCode::INTERNAL_SERVER_ERROR.into_response());
+    answering.map(move |it| it.unwrap_or_else(failed))
+}
+
 /// The requests of one connection, until it is closed or says nothing more.
 async fn answer(socket: Socket, peer: Peer, place: &Place, app: Router, mut closing: Closing) {
     // Whoever hangs up, or says what is no TLS or no HTTP, is not waited for.
@@ -150,7 +165,12 @@ async fn answer(socket: Socket, peer: Peer, place: &Place, app: Router, mut clos
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(ConnectInfo(peer.clone()));
         request.extensions_mut().insert(keeps.clone());
-        app.clone().call(request)
+        let is_order = request.method() != Method::GET;
+        let answering = app.clone().call(request);
+        match is_order {
+            true => Either::Left(carried_out(answering)),
+            false => Either::Right(answering),
+        }
     });
     let mut server = http1::Builder::new();
     server

@@ -53,8 +53,11 @@ fn a_plate_read_elsewhere_calibrates_the_table_placement_by_placement_and_nothin
         let wrong = bed.placement(5.0, 0.0);
         let refused = bed.by_files(&of_files(RunKind::Calibrate, vec![wrong]));
         assert_eq!(refused.state, RunState::Failed, "{refused:?}");
-        let cause = refused.cause.expect("it says why").cause;
+        let cause = refused.cause.clone().expect("it says why").cause;
         assert!(cause.contains("at-5.csv:2:1: `offset` is 5"), "{cause}");
+        assert!(!refused.can_resume, "{refused:?}");
+        let by_driving = bed.client.resume(&anna(), &refused.id).unwrap_err();
+        assert_eq!(by_driving.code, Code::RunState, "{by_driving}");
 
         let mut lies_at = 0.0;
         let first = bed.placement(0.0, 0.0);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mock_bus::fault::Fault;
 use service::{AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest, StopMode};
-use tests::{Edit, LINEAR, Shipped};
+use tests::{Edit, LINEAR, Rig, Shipped};
 use units::MetresPerSecond;
 
 use super::together::path;
@@ -203,18 +203,22 @@ fn after_a_fault_a_reset_and_a_new_zero_make_the_axis_usable() {
     });
 }
 
-/// Line 1, the fourth end: what does not get there in time is stopped and says so.
-#[test]
-fn a_motion_that_takes_too_long_is_stopped_and_timed_out() {
-    // A drive that keeps to a limit of its own, which the configuration does not know.
+/// A drive that keeps to a limit of its own, which the configuration does not know.
+fn stage_as_fast_as(mm_per_s: f64, rig: Rig, folder: &Path) -> Stage {
     let limit = |mm_per_s: f64| format!("max_profile_velocity_mm_per_s = {mm_per_s:.1}");
-    let emulated = LINEAR.emulated.edit(&limit(1000.0), &limit(3.0));
+    let emulated = LINEAR.emulated.edit(&limit(1000.0), &limit(mm_per_s));
     let shipped = Shipped {
         emulated: Box::leak(emulated.into_boxed_str()),
         ..LINEAR
     };
+    Stage::new(rig, (shipped, SEED), folder, |text| text)
+}
+
+/// Line 1, the fourth end: what does not get there in time is stopped and says so.
+#[test]
+fn a_motion_that_takes_too_long_is_stopped_and_timed_out() {
     each(
-        |rig, folder| Stage::new(rig, (shipped, SEED), folder, |text| text),
+        |rig, folder| stage_as_fast_as(3.0, rig, folder),
         |bed| {
             bed.client.zero(&anna(), None);
             let view = bed.ended(&bed.begin(&to("x", 55.0)));
@@ -223,6 +227,26 @@ fn a_motion_that_takes_too_long_is_stopped_and_timed_out() {
             assert!(bed.encoder_mm("x") < 50.0);
             let axis = bed.client.axis("x").unwrap();
             assert_eq!(axis.state, AxisState::ErrorStop, "it was stopped");
+        },
+    );
+}
+
+/// Of a long way the drive takes half as long again before it gives up; nobody waits for that.
+#[test]
+fn a_motion_that_falls_behind_is_stopped_and_the_machine_goes_on() {
+    each(
+        |rig, folder| stage_as_fast_as(1.0, rig, folder),
+        |bed| {
+            bed.client.zero(&anna(), None);
+            let slow = MoveRequest {
+                speed: Some(MetresPerSecond(1.4e-3).into()),
+                ..to("x", 55.0)
+            };
+            let view = bed.ended(&bed.begin(&slow));
+            assert_eq!(view.state, MotionState::TimedOut, "{view:?}");
+            assert!(bed.encoder_mm("x") < 54.0);
+            let axis = bed.client.axis("x").unwrap();
+            assert_eq!(axis.state, AxisState::Standstill, "it was stopped");
         },
     );
 }

@@ -132,6 +132,10 @@ fn keys_and_what_parts_them_from_values_say_how_they_are_written() {
     for between in [" ", ", ", "; ", "\t"] {
         check(&format!("a = 1{between}b = 2"), cause, help, Some("a = 1"));
     }
+    for line in ["path = “a=b”", "a = 1\u{a0}b = 2", "x = 20 // 20°=max"] {
+        // Whatever is said of it.
+        of_line(line, 0);
+    }
 }
 
 #[test]

@@ -146,7 +146,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         self.node.up(now);
         self.commanded_mode = Some(OperationMode::ProfilePosition);
         match sample.status.state() {
-            PowerState::OperationEnabled => self.stop_what_was_left(now),
+            PowerState::OperationEnabled | PowerState::QuickStopActive => {
+                self.stop_what_was_left(now);
+            }
             _ => self.finish(Ok(())),
         }
         self.take_sample(now, sample);

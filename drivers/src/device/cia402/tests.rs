@@ -397,15 +397,18 @@ fn a_start_identifies_configures_and_starts_the_drive() {
 
 #[test]
 fn a_drive_that_somebody_left_in_motion_is_stopped_by_the_start() {
-    let mut rig = Rig::new();
-    (rig.fake.state, rig.fake.target, rig.fake.moving) = (0x27, 1_000_000, true);
-    assert_eq!(rig.start(), Ok(()));
-    assert_eq!(rig.fake.state, 0x40);
-    assert_eq!(rig.drive.power_state(), Some(PowerState::SwitchOnDisabled));
-    let counters = rig.drive.counters();
-    assert!(counters.contains(&("found enabled, and stopped", 1)));
-    // As good as one that was off.
-    assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
+    // Enabled, or held under power by a quick stop.
+    for state in [0x27, 0x07] {
+        let mut rig = Rig::new();
+        (rig.fake.state, rig.fake.target, rig.fake.moving) = (state, 1_000_000, true);
+        assert_eq!(rig.start(), Ok(()));
+        assert_eq!(rig.fake.state, 0x40);
+        assert_eq!(rig.drive.power_state(), Some(PowerState::SwitchOnDisabled));
+        let counters = rig.drive.counters();
+        assert!(counters.contains(&("found enabled, and stopped", 1)));
+        // As good as one that was off.
+        assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
+    }
 }
 
 /// CiA 301, 7.5.2.38: off, no mapping, map, count, type, on.

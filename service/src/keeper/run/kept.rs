@@ -147,6 +147,8 @@ impl Run {
     pub(super) fn let_go(&mut self) {
         self.view.can_resume = self.can_go_on();
         if self.view.state.is_end() && !self.view.can_resume {
+            // What was done by files is not gone on with by driving.
+            self.task.is_resumed &= !self.task.has_files();
             self.task.judged = None;
         }
     }
