@@ -94,7 +94,7 @@ mod tests {
             panic!("one millisecond was taken")
         };
         let error = error.to_string();
-        assert!(error.contains("1.49ms of every 1ms"), "{error}");
+        assert!(error.contains("take 1.49ms, and it has 1ms"), "{error}");
         assert!(error.contains("a SYNC period of 1.8"), "{error}");
         let loaded = four_axes("2.0").expect("two milliseconds fit");
         let load = super::load(&loaded.config, "can0").expect("it fits");

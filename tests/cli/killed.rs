@@ -134,7 +134,13 @@ fn what_a_killed_service_left_in_motion_is_stopped_by_one_that_comes_at_once() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         bench.configure("machine.toml", |text| {
+            // Longer than anybody needs to start a service.
+            let watch = "heartbeat_consumer_ms = 150\nwatch_master_ms = ";
             text.edit("move_timeout_s = 10.0", "move_timeout_s = 100000.0")
+                .edit(
+                    &format!("{watch}500\n\n[axis.x.identity]"),
+                    &format!("{watch}20000\n\n[axis.x.identity]"),
+                )
         });
         killed_after(&bench, moving(&bench), 3);
         let service = keep(&bench);

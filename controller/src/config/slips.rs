@@ -232,8 +232,9 @@ fn heading(parts: &Parts<'_>) -> Option<Slip> {
     let help =
         format!("write `{meant}`: a section's name stands in brackets, its parts with points");
     let at = parts.said.len() - parts.said.trim_start().len();
-    // Other brackets may be those of a remark: what follows stays where it is.
-    let meant = line.starts_with('[').then_some(meant);
+    // Words in other brackets may be a remark: what follows stays where it is.
+    let is_remark = !line.starts_with('[') && line.contains(' ');
+    let meant = Some(meant).filter(|_| !is_remark);
     Some(Slip::new(at, cause, help, meant))
 }
 

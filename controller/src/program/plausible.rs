@@ -52,21 +52,16 @@ fn rows(text: &str, names: &[&str]) -> Vec<Row> {
 /// The middle of some numbers; 0 of none.
 fn middle(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
-    let half = numbers.len() / 2;
-    let Some(above) = numbers.get(half) else {
-        return 0.0;
-    };
-    match numbers.len() % 2 {
-        0 => above.midpoint(numbers[half - 1]),
-        _ => *above,
-    }
+    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The number that is farthest from the middle of all, and how far.
 fn farthest(numbers: &[f64]) -> Option<(usize, f64)> {
     let middle = middle(numbers.to_vec());
     let off = numbers.iter().map(|it| (it - middle).abs());
-    off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
+    // Of several the first.
+    let off: Vec<(usize, f64)> = off.enumerate().collect();
+    off.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 fn refused(file: &str, row: &Row, seen: &str, expected: &str, help: &str) -> Failure {

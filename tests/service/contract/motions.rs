@@ -231,26 +231,6 @@ fn a_motion_that_takes_too_long_is_stopped_and_timed_out() {
     );
 }
 
-/// Of a long way the drive takes half as long again before it gives up; nobody waits for that.
-#[test]
-fn a_motion_that_falls_behind_is_stopped_and_the_machine_goes_on() {
-    each(
-        |rig, folder| stage_as_fast_as(1.0, rig, folder),
-        |bed| {
-            bed.client.zero(&anna(), None);
-            let slow = MoveRequest {
-                speed: Some(MetresPerSecond(1.4e-3).into()),
-                ..to("x", 55.0)
-            };
-            let view = bed.ended(&bed.begin(&slow));
-            assert_eq!(view.state, MotionState::TimedOut, "{view:?}");
-            assert!(bed.encoder_mm("x") < 54.0);
-            let axis = bed.client.axis("x").unwrap();
-            assert_eq!(axis.state, AxisState::Standstill, "it was stopped");
-        },
-    );
-}
-
 /// Line 5: a motion to where the axis stands ends done at once.
 #[test]
 fn a_motion_to_where_the_axis_stands_is_done_at_once() {

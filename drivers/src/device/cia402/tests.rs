@@ -400,6 +400,7 @@ fn a_drive_that_somebody_left_in_motion_is_stopped_by_the_start() {
     // Enabled, or held under power by a quick stop.
     for state in [0x27, 0x07] {
         let mut rig = Rig::new();
+        rig.fake.stays_in_quick_stop = true;
         (rig.fake.state, rig.fake.target, rig.fake.moving) = (state, 1_000_000, true);
         assert_eq!(rig.start(), Ok(()));
         assert_eq!(rig.fake.state, 0x40);
