@@ -224,6 +224,14 @@ pub struct SightingConfig {
     pub range_arcsec: f64,
 }
 
+impl RotaryConfig {
+    /// Whether the machine turns the table while its plate is read; a person does otherwise, while its drive is off.
+    pub(crate) fn is_driven(&self) -> bool {
+        let sighting = self.sighting.as_ref();
+        sighting.is_none_or(SightingConfig::is_driven)
+    }
+}
+
 impl SightingConfig {
     /// Whether the table is driven to each line; a person turns it by hand otherwise.
     pub(crate) const fn is_driven(&self) -> bool {

@@ -15,7 +15,7 @@ use crate::rotary::asked::Asking;
 use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::sighted::alone::Progress;
 use crate::rotary::table::RotaryTable;
-use crate::rotary::{RotaryCalibrated, RotaryTeller, SightingConfig};
+use crate::rotary::{RotaryCalibrated, RotaryTeller};
 use crate::run::missing;
 use crate::runs::{
     Change, Found, Group, GroupRuns, Planned, Task, Told, Travel, Work, each_usable,
@@ -29,7 +29,7 @@ pub(crate) static RUNS: GroupRuns = GroupRuns {
     refuse: Task::without_warm_up,
     planned,
     perform,
-    is_driven,
+    is_driven: |config, axis| config.rotary[axis].is_driven(),
     load,
     with_companions: |_, chosen| Ok(chosen),
     usable,
@@ -48,12 +48,6 @@ fn groups(config: &MachineConfig) -> Vec<Group> {
         ..Group::of_one(axis, &RUNS)
     });
     groups.collect()
-}
-
-/// Whether the machine turns the table while its plate is read.
-fn is_driven(config: &MachineConfig, axis: &str) -> bool {
-    let sighting = config.rotary[axis].sighting.as_ref();
-    sighting.is_none_or(SightingConfig::is_driven)
 }
 
 /// A verification by a detector is one placement: it is read again.
@@ -123,7 +117,7 @@ impl RotaryTable<'_> {
             asks,
             ..Planned::default()
         };
-        if !self.is_driven() {
+        if !self.config.is_driven() {
             return by_hand;
         }
         Planned {

@@ -201,7 +201,7 @@ pub(crate) fn is_turned_by_hand(args: &AxisArgs) -> Result<bool, Failure> {
     let loaded = config::load(&args.machine.config)?;
     let meant = |it: &&String| args.axis.as_ref().is_none_or(|axis| axis == *it);
     let mut meant = loaded.config.rotary.iter().filter(|(axis, _)| meant(axis));
-    Ok(meant.any(|(_, it)| it.sighting.as_ref().is_some_and(|it| !it.is_driven())))
+    Ok(meant.any(|(_, it)| !it.is_driven()))
 }
 
 /// The journal of `verb` that `resume` names, or the newest that was left.

@@ -7,7 +7,6 @@ use super::dialog::Dialog;
 use super::person::Person;
 use super::stand::ByHand;
 use crate::failure::Failure;
-use crate::rotary::SightingConfig;
 use crate::rotary::calibrate::RotaryCalibrated;
 use crate::rotary::placed::Placed;
 use crate::rotary::plate_journal::PlateJournal;
@@ -87,12 +86,6 @@ impl RotaryTable<'_> {
         verified
     }
 
-    /// Whether the machine turns the table; a person does otherwise, while its drive is off.
-    pub(crate) fn is_driven(&self) -> bool {
-        let sighting = self.config.sighting.as_ref();
-        sighting.is_none_or(SightingConfig::is_driven)
-    }
-
     fn read_by(
         &mut self,
         run: &PlateRun,
@@ -108,7 +101,7 @@ impl RotaryTable<'_> {
             self.memory.plate_at = Some(due.offset);
         }
         let dialog = Dialog::new(self.axis, run, sighting, due.offset);
-        let placed = if self.is_driven() {
+        let placed = if self.config.is_driven() {
             self.place_plate(run, &due, person)?;
             dialog.read(self, person, journal)
         } else {
