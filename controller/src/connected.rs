@@ -3,6 +3,7 @@
 use core::ops::{Deref, DerefMut};
 
 use drivers::transport::Transport;
+use machine::kept_zero;
 
 use crate::assemble;
 use crate::config::{ConfigHash, Diagnostic, Loaded, MachineConfig, filled_in};
@@ -37,12 +38,24 @@ impl DerefMut for Machine {
     }
 }
 
+/// Where it is noted of each axis that it has its zero, beside the records.
+const ZEROS: &str = "zeros";
+
+/// A hash of all that the configuration says: not only what a calibration depends on says what a count means.
+fn in_full(loaded: &Loaded) -> String {
+    let text = format!("{:?}", loaded.config);
+    ConfigHash::of_texts(&text, &[]).as_str().to_owned()
+}
+
 impl Machine {
     /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
     /// Nothing is sent yet.
     pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
+        let mut core = machine::Machine::new(assemble::parts(loaded), transport);
+        let store = loaded.config.machine.store();
+        kept_zero::keep(&mut core, store.root().join(ZEROS), in_full(loaded));
         Self {
-            core: machine::Machine::new(assemble::parts(loaded), transport),
+            core,
             config: loaded.config.clone(),
             config_hash: loaded.hash.clone(),
             memories: Memories::default(),

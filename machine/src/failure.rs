@@ -1,6 +1,7 @@
 //! Why a machine of any kind stopped or refused: each says where, what was expected, what was seen.
 
 use core::time::Duration;
+use std::path::PathBuf;
 
 use drivers::device::{Alarm, DeviceError};
 use drivers::transport::SendError;
@@ -150,6 +151,16 @@ pub enum Failure {
         /// Which axis.
         axis: String,
     },
+    /// What was noted of an earlier zero would be believed at the next start.
+    #[error(
+        "{}: cannot be removed: {source}; it tells of a zero that the axis loses now, and nothing was moved", path.display()
+    )]
+    ZeroNoted {
+        /// Which file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
     /// The machine was stopped, or was never started: its alarms would not be handled.
     #[error("{device}: not moved, the machine was stopped; start it again (`Machine::start`)")]
     NotStarted {
@@ -202,6 +213,7 @@ impl Failure {
             | Self::Babbling { .. }
             | Self::SoftLimit { .. }
             | Self::NotZeroed { .. }
+            | Self::ZeroNoted { .. }
             | Self::NoSuchAxis { .. }
             | Self::NoSuchDevice { .. }
             | Self::Interrupted
@@ -226,7 +238,10 @@ impl Failure {
             Self::Interrupted => STOPPED_BY + SIGINT,
             Self::Terminated { signal } => STOPPED_BY.saturating_add(*signal),
             Self::NoSuchAxis { .. } | Self::NoSuchDevice { .. } => 2,
-            Self::SoftLimit { .. } | Self::NotZeroed { .. } | Self::NotStarted { .. } => 3,
+            Self::SoftLimit { .. }
+            | Self::NotZeroed { .. }
+            | Self::ZeroNoted { .. }
+            | Self::NotStarted { .. } => 3,
             Self::Send { .. }
             | Self::Link { .. }
             | Self::BusOff { .. }

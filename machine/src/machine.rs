@@ -27,6 +27,7 @@ use crate::patience::Patience;
 use crate::ports::Ports;
 use crate::stop_request::StopRequest;
 use crate::sync_account::SyncAccount;
+use crate::zero_notes::KeptZeros;
 
 pub(crate) use attendant::call as call_attendant;
 pub use attendant::{Attendant, attend};
@@ -84,6 +85,8 @@ pub struct Machine {
     pub(crate) approach: Vec<ApproachTracker>,
     /// By the numbers of the drives: zeroed since it was last powered.
     pub(crate) zeroed: Vec<bool>,
+    /// What is noted of them for the next start.
+    pub(crate) kept_zeros: Option<KeptZeros>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
@@ -121,6 +124,7 @@ impl Machine {
             host_watch: HostWatch::default(),
             approach: vec![ApproachTracker::new(); axes.len()],
             zeroed: vec![false; axes.len() + parts.rotaries.len()],
+            kept_zeros: None,
             devices: Devices {
                 axes,
                 rotaries: parts.rotaries,
@@ -207,17 +211,6 @@ impl Machine {
             .is_ok_and(|at| self.zeroed[at] && self.devices.drive(at).is_homed())
     }
 
-    /// Says that `axis` has its zero, until its drive loses power or the machine is started anew;
-    /// or that it has none.
-    ///
-    /// # Errors
-    /// When there is no such axis.
-    pub fn set_zeroed(&mut self, axis: &str, zeroed: bool) -> Result<(), Failure> {
-        let at = self.devices.drive_index(axis)?;
-        self.zeroed[at] = zeroed;
-        Ok(())
-    }
-
     /// Coordinates mean something only after the zero.
     ///
     /// # Errors
@@ -251,32 +244,6 @@ impl Machine {
             .devices
             .drive(self.devices.drive_index(axis)?)
             .power_state())
-    }
-
-    /// Starts SYNC, every axis and every analog module, and checks who they are. Nothing
-    /// moves. Instruments, and cameras that are no detectors, are started when a procedure first needs them: a machine
-    /// in production may have none.
-    ///
-    /// # Errors
-    /// When a device does not answer, is another one than configured, or refuses its set-up.
-    pub fn start(&mut self) -> Result<(), Failure> {
-        self.catch_up();
-        self.devices.lookouts.fill(Lookout::default());
-        self.zeroed.fill(false);
-        self.approach.iter_mut().for_each(ApproachTracker::forget);
-        self.ports.set_sync(&mut *self.transport, true)?;
-        let machine_devices = self.devices.instrument_device(0);
-        let detectors = self.devices.detector_cameras();
-        let now = self.now();
-        for at in (0..machine_devices).chain(detectors.iter().copied()) {
-            self.devices.unit_mut(at).device.start(now);
-        }
-        for at in (0..machine_devices).chain(detectors) {
-            self.await_start(at)?;
-        }
-        self.devices.open_lookouts();
-        self.supervision = Supervision::On;
-        Ok(())
     }
 
     /// Starts device number `at`, an instrument or a camera called `name`, unless it runs already,

@@ -11,6 +11,7 @@ use wire::can::{BusError, BusErrorClass, ControllerProblem};
 use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::failure::Failure;
+use crate::kept_zero;
 use crate::machine::{Machine, Supervision, call_attendant};
 use crate::outbox::Sender;
 
@@ -195,6 +196,8 @@ impl Machine {
         for (at, alarm) in &raised {
             if takes_reference(alarm) && *at < self.devices.drive_count() {
                 self.zeroed[*at] = false;
+                // The alarm stops the machine; a note that cannot be removed is found wrong at the next start.
+                let _ = kept_zero::forget(self, *at);
             }
         }
         // An instrument or a camera that nobody reads may have its beam blocked.
@@ -223,12 +226,16 @@ fn worse(error: BusError) -> Option<&'static str> {
     }
 }
 
-/// A drive that was reset has lost its origin, whoever is listening.
+/// A drive that was reset, that lost count, or whose encoder failed, has lost its origin, whoever is listening.
 const fn takes_reference(alarm: &Alarm) -> bool {
-    matches!(
-        alarm,
+    /// The class of a sensor's errors (CiA 402, error codes; 0x7305 is the first incremental encoder).
+    const SENSOR: u16 = 0x7300;
+    match alarm {
         Alarm::UnexpectedBootUp { .. }
-            | Alarm::DuplicateNode { .. }
-            | Alarm::AmplifierRestarted { .. }
-    )
+        | Alarm::DuplicateNode { .. }
+        | Alarm::AmplifierRestarted { .. }
+        | Alarm::PositionJump { .. } => true,
+        Alarm::Emergency { emergency, .. } => emergency.code.0 & 0xFF00 == SENSOR,
+        _ => false,
+    }
 }

@@ -337,6 +337,7 @@ fn code_of_machine(failure: &machine::Failure) -> Code {
     match failure {
         Of::SoftLimit { .. } => Code::SoftLimit,
         Of::NotZeroed { .. } => Code::NotZeroed,
+        Of::ZeroNoted { .. } => Code::Storage,
         Of::NotStarted { .. } => Code::ErrorStop,
         Of::NoSuchAxis { .. } => Code::NoSuchAxis,
         Of::NoSuchDevice { .. } => Code::Configuration,

@@ -167,6 +167,49 @@ fn what_a_killed_service_left_in_motion_is_stopped_by_one_that_comes_at_once() {
     }
 }
 
+/// The emulated drive has a variable that it forgets without power.
+#[test]
+fn a_service_that_comes_again_moves_without_a_zero_where_the_drive_proves_that_it_kept_it() {
+    for rig in live_rigs() {
+        let bench = Bench::new(rig);
+        bench.configure("machine.toml", |text| {
+            text.edit("move_timeout_s = 10.0", "move_timeout_s = 100000.0")
+                .edit(
+                    "\n[axis.x]\n",
+                    "\n[axis.x]\nkept_zero = { by = \"mark\", object = \"0x2F00:01\" }\n",
+                )
+        });
+        killed_after(&bench, moving(&bench), 5);
+        Watcher::of(&bench).wait(STOPPED_WITHIN);
+        let service = keep(&bench);
+        let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+        assert_eq!(
+            (&axis["homed"], &axis["state"]),
+            (&json!(true), &json!("Disabled")),
+            "{axis:#}"
+        );
+        let moved = bench.run(&["move", "machine.toml", "x=5mm", "--uncompensated"]);
+        let moved = moved.with_code(0);
+        let there = Watcher::of(&bench).true_mm();
+        bench.run(&["zero", "machine.toml"]).with_code(0);
+        let again = bench.run(&["move", "machine.toml", "x=5mm", "--uncompensated"]);
+        again.with_code(0);
+        let off = Watcher::of(&bench).true_mm() - there;
+        assert!(
+            off.abs() < 0.005,
+            "{off} mm beside where a new zero brings it: {moved}"
+        );
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+        // Whoever ends a service in order takes nothing from the drive, either.
+        let service = keep(&bench);
+        let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
+        assert_eq!(axis["homed"], true, "{axis:#}");
+        service.signal(Signal::SIGTERM);
+        assert_eq!(service.end().code, Some(0));
+    }
+}
+
 /// So fast the axis goes from one position of a calibration to the next, which is nearly all of the time.
 const SLOWLY_MM_PER_S: f64 = 1.0;
 /// A kill comes so long after the run was begun at most, in seconds of the machine.

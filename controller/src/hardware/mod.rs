@@ -11,6 +11,7 @@ pub(crate) mod camera;
 pub(crate) mod certificate;
 pub(crate) mod drive;
 pub(crate) mod instrument;
+pub(crate) mod kept_zero;
 pub(crate) mod node;
 
 use core::time::Duration;

@@ -240,6 +240,11 @@ impl Course {
         Some(encoder + table.deviation(encoder, approach).ok()?)
     }
 
+    /// Standard uncertainty of the zero that the axis has, where one is known.
+    pub const fn zero_uncertainty(&self) -> Option<Metres> {
+        self.zero
+    }
+
     /// How uncertain it is where the point stands after a corrected stop at `position`; `None` where
     /// the calibration in use says nothing of it: beyond its range, or when it has no budget.
     ///

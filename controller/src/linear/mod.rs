@@ -10,6 +10,7 @@ mod cross_check;
 mod datum;
 mod datum_in_use;
 mod dependence;
+mod earlier_zero;
 pub(crate) mod entries;
 mod finding;
 pub(crate) mod gantry;

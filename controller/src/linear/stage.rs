@@ -9,6 +9,7 @@ use crate::config::{AxisConfig, MachineConfig};
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::handle::{Core, no_such_axis};
+use crate::linear::earlier_zero::kept_since;
 use crate::linear::memory::AxisMemory;
 use crate::linear::{Course, GantryConfig, table_correction};
 
@@ -29,11 +30,12 @@ impl Machine {
     /// # Errors
     /// When there is no such axis.
     pub fn linear(&mut self, axis: &str) -> Result<LinearStage<'_>, Failure> {
-        let (core, memories) = Core::of(self);
+        let (mut core, memories) = Core::of(self);
         let Some((axis, config)) = core.config.axis.get_key_value(axis) else {
             return Err(no_such_axis(axis, &core.devices().axis_names()));
         };
         let other = gantry_of(core.config, axis).map(|(_, gantry)| gantry.other_than(axis));
+        let kept = kept_since(&mut core, memories, axis, config)?;
         let (memory, other_side) = match other {
             None => (memories.of(axis, AxisMemory::default), None),
             Some(other) => {
@@ -41,6 +43,7 @@ impl Machine {
                 (own, Some(other))
             }
         };
+        memory.course.zero = memory.course.zero.or(kept);
         Ok(LinearStage {
             memory,
             other_side,

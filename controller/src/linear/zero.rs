@@ -23,6 +23,7 @@ use crate::correction::Correction;
 use crate::failure::Failure;
 use crate::homing;
 use crate::linear::ZeroConfig;
+use crate::linear::earlier_zero::newest_zero;
 use crate::linear::passes::{SEARCHED, STEPS};
 use crate::linear::stage::{LinearStage, gantry_of};
 use crate::linear::zero_budget;
@@ -31,7 +32,7 @@ use crate::linear::{LinearEntry, LinearLog};
 use crate::made_by::made_by;
 use crate::run::utc_now;
 use crate::run::{missing, note_failure};
-use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store, read_journal};
+use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store};
 use machine::{STOP_LIMIT, Stage};
 
 /// A zero that was found.
@@ -357,11 +358,4 @@ pub(super) fn to_limit_switch(config: &ZeroConfig) -> AxisCommand {
         position: Metres::from_mm(config.negative_limit_mm),
         speed: MetresPerSecond(config.reference_speed_mm_per_s * 1e-3),
     }
-}
-
-/// What the newest zero of an axis or a gantry has on record. A trend is worth having but never worth failing for:
-/// a journal that cannot be read is no reason not to zero.
-pub(super) fn newest_zero(store: &Store, name: &str) -> Option<LinearLog> {
-    let path = store.newest_run("zero", name).ok().flatten()?;
-    Some(read_journal::<LinearLog>(&path).ok()?.log)
 }

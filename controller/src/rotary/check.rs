@@ -280,6 +280,9 @@ fn check_verify(
 fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
     let speed_max = rotary.speed_max_deg_per_s;
     judge.within("speed_deg_per_s", rotary.speed_deg_per_s, 0.0, speed_max);
+    if let Some(kept) = &rotary.kept_zero {
+        kept.check(judge);
+    }
     rotary.node.check(judge, &config.can);
 }
 

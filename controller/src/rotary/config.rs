@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::config::{HomeOffsetName, OptionCodesConfig};
+use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::node::NodeConfig;
 
 /// The kinds of drive of a rotary axis.
@@ -111,6 +112,8 @@ pub struct RotaryConfig {
     /// As for a linear axis.
     #[serde(default)]
     pub option_codes: OptionCodesConfig,
+    /// As for a linear axis.
+    pub kept_zero: Option<KeptZeroConfig>,
     /// How it gets its origin: the encoder's index mark.
     pub zero: Option<RotaryZeroConfig>,
     /// What sees the lines of a plate pass.

@@ -16,6 +16,7 @@ use wire::Port;
 use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
 use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
+use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::{CHECKED, millis};
 use crate::rotary::failure::RotaryFailure;
 use crate::rotary::{
@@ -88,6 +89,7 @@ pub fn rotary_settings(
         homing_acceleration: acceleration,
         stall_max: patience.beyond(usual.common.sync_period),
         home_offset: home_offset(rotary.home_offset),
+        reference_proof: rotary.kept_zero.as_ref().map(KeptZeroConfig::proof),
         options: option_codes(&rotary.option_codes, usual.options),
         timeouts: patient_drive(
             Cia402Timeouts {

@@ -21,6 +21,7 @@ mod latch;
 mod name;
 pub mod nd287;
 mod plausible;
+mod reference;
 pub mod serial_line;
 mod shared_line;
 pub mod umd2;
@@ -39,6 +40,7 @@ pub use direction::Direction;
 pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use name::DeviceName;
+pub use reference::{DriveReference, ReferenceLost, ReferenceProof};
 pub use shared_line::{LineUse, Urgency};
 
 /// The sans-io face that every device shows to the loop that drives it.
@@ -100,6 +102,24 @@ pub trait ServoDrive: Device {
     /// Whether the drive has a reference since it was last powered.
     fn is_homed(&self) -> bool;
 
+    /// Whether it is configured how the drive proves that it kept its reference.
+    fn proves_reference(&self) -> bool {
+        false
+    }
+
+    /// What the last [`DriveCommand::ReadReference`] has read.
+    fn reference(&self) -> Option<DriveReference> {
+        None
+    }
+
+    /// Counts as homed again, when what was read last shows that its coordinates are those in which `then` was read.
+    ///
+    /// # Errors
+    /// What speaks against it; it does not count as homed then.
+    fn take_up_reference(&mut self, _then: &DriveReference) -> Result<(), ReferenceLost> {
+        Err(ReferenceLost::NotHomed)
+    }
+
     /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
     /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`; when
     /// that was lost, the moment it was to start, since the motion may be as old. `None`
@@ -129,6 +149,11 @@ pub enum DriveCommand {
     },
     /// Change back to profile position.
     LeaveCyclic,
+    /// Read what shows the reference of a drive that [`ServoDrive::proves_reference`]. Nothing moves.
+    ReadReference {
+        /// What is written into the drive first, where its proof is a [`ReferenceProof::Mark`]. Not 0.
+        mark: Option<u32>,
+    },
 }
 
 /// A controlled direction, linear or rotary: one servo drive that positions in `Q`.

@@ -230,7 +230,13 @@ impl Script {
             .map(|(_, data)| data.as_slice())
     }
 
-    /// The same as an unsigned number of at most 32 bits.
+    /// All that was read from `object`, in order, as unsigned numbers of at most 32 bits.
+    pub fn values(&self, object: Object) -> impl Iterator<Item = u32> + '_ {
+        let of = self.values.iter().filter(move |(of, _)| *of == object);
+        of.map(|(_, data)| Value::new(data).raw() as u32)
+    }
+
+    /// What was read from `object` last, as an unsigned number of at most 32 bits.
     pub fn value(&self, object: Object) -> Option<u32> {
         self.data(object).map(|data| Value::new(data).raw() as u32)
     }

@@ -4,6 +4,8 @@
 mod certified;
 mod gantry;
 mod job;
+mod kept_reference;
+mod kept_reference_history;
 mod linear;
 mod linear_causes;
 mod linear_zero;

@@ -13,6 +13,7 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale};
 use super::{CyclicConfig, Family, Task};
 use crate::config::judge::Judge;
 use crate::hardware::bus::Wiring;
+use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::node::NodeConfig;
 use crate::hardware::{CHECKED, millis};
 
@@ -35,6 +36,8 @@ pub struct Cia402AxisConfig {
     /// back), so that a group starts at the same SYNC; a quick stop is up to one SYNC later.
     #[serde(default)]
     pub synchronous_start: bool,
+    /// How the drive proves at a start that it has kept its zero; without it an axis is zeroed after each start.
+    pub kept_zero: Option<KeptZeroConfig>,
     /// The axis can follow cyclic set-points.
     pub cyclic: Option<CyclicConfig>,
 }
@@ -98,6 +101,7 @@ impl Cia402AxisConfig {
             quick_stop_deceleration: Some(quick_stop),
             stall_max: patience.beyond(usual.common.sync_period),
             home_offset: home_offset(self.home_offset),
+            reference_proof: self.kept_zero.as_ref().map(KeptZeroConfig::proof),
             options: option_codes(&self.option_codes, usual.options),
             synchronous_start: self.synchronous_start,
             timeouts: patient_drive(
@@ -177,6 +181,9 @@ impl Family for Cia402AxisConfig {
         if self.cyclic.is_some() {
             self.check_cyclic(judge);
             self.check_period(judge, wiring);
+        }
+        if let Some(kept) = &self.kept_zero {
+            kept.check(judge);
         }
         self.node.check(judge, wiring.can);
     }

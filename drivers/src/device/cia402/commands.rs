@@ -5,7 +5,10 @@ use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::homing::HomingPlace;
 use super::{Activity, Cia402Drive};
-use crate::device::{Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, ServoDrive};
+use crate::device::{
+    Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, DriveReference, ReferenceLost,
+    ServoDrive,
+};
 
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn refuse_out_of_service(&mut self) {
@@ -34,6 +37,7 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
             DriveCommand::Halt => self.begin_halt(now),
             DriveCommand::EnterCyclic { period } => self.begin_cyclic(now, period),
             DriveCommand::LeaveCyclic => self.end_cyclic(now),
+            DriveCommand::ReadReference { mark } => self.begin_reference(now, mark),
         }
     }
 
@@ -43,6 +47,18 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
 
     fn is_homed(&self) -> bool {
         self.homed
+    }
+
+    fn proves_reference(&self) -> bool {
+        self.settings.reference_proof.is_some()
+    }
+
+    fn reference(&self) -> Option<DriveReference> {
+        self.reference
+    }
+
+    fn take_up_reference(&mut self, then: &DriveReference) -> Result<(), ReferenceLost> {
+        self.compare_reference(then)
     }
 
     fn started_at(&self) -> Option<Time> {

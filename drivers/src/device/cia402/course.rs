@@ -28,7 +28,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             | Activity::Power(_)
             | Activity::Halt(_)
             | Activity::Latch(_)
-            | Activity::Mode(_) => {
+            | Activity::Mode(_)
+            | Activity::Reference { .. } => {
                 self.course = None;
                 return;
             }

@@ -26,6 +26,7 @@ mod latch;
 mod modulo;
 mod motion;
 mod power;
+mod reference;
 mod settings;
 mod start;
 mod supervision;
@@ -54,7 +55,7 @@ pub use settings::{
 
 use super::canopen_node::{CanopenNode, NodeEvent};
 use super::plausible::Plausible;
-use super::{Alarm, Axis, Device, DeviceError, Identity, RotaryAxis, Seen};
+use super::{Alarm, Axis, Device, DeviceError, DriveReference, Identity, RotaryAxis, Seen};
 use crate::protocol::script::Script;
 use cyclic::ModeChange;
 use homing::Homing;
@@ -77,6 +78,10 @@ enum Activity {
     Homing(Homing),
     Latch(LatchChange),
     Mode(ModeChange),
+    /// What shows its reference is read, after this mark was written.
+    Reference {
+        mark: Option<u32>,
+    },
 }
 
 impl Activity {
@@ -90,6 +95,7 @@ impl Activity {
             Self::Homing(_) => "homing",
             Self::Latch(_) => "setting the touch probe",
             Self::Mode(_) => "the change of mode",
+            Self::Reference { .. } => "reading its reference",
         }
     }
 }
@@ -144,6 +150,8 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     prepared: Option<Move>,
     started_at: Option<Time>,
     homed: bool,
+    /// What showed its reference when it was read last.
+    reference: Option<DriveReference>,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
     /// What the object was that is compared with them.
@@ -207,6 +215,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             prepared: None,
             started_at: None,
             homed: false,
+            reference: None,
             first: None,
             compared: None,
             kept: None,
@@ -299,7 +308,11 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
             (Activity::Power(_) | Activity::Halt(_), _) => false,
             (
-                Activity::Move(_) | Activity::Homing(_) | Activity::Latch(_) | Activity::Mode(_),
+                Activity::Move(_)
+                | Activity::Homing(_)
+                | Activity::Latch(_)
+                | Activity::Mode(_)
+                | Activity::Reference { .. },
                 _,
             ) => true,
         };
@@ -354,6 +367,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Activity::Homing(_) => self.homing_prepared(now),
             Activity::Latch(_) => self.latch_written(now),
             Activity::Mode(_) => self.mode_written(now),
+            Activity::Reference { .. } => self.reference_read(script),
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -365,7 +379,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.profile = None;
                 self.finish(Err(error));
             }
-            Activity::Latch(_) | Activity::Mode(_) => self.finish(Err(error)),
+            Activity::Latch(_) | Activity::Mode(_) | Activity::Reference { .. } => {
+                self.finish(Err(error));
+            }
             Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
         }
     }
@@ -403,7 +419,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.node.handle_timeout(now);
         self.pump(now);
         match &self.activity {
-            Activity::Idle | Activity::Starting => {}
+            Activity::Idle | Activity::Starting | Activity::Reference { .. } => {}
             Activity::Power(_) => self.power_timeout(now),
             Activity::Move(_) => self.move_timeout(now),
             Activity::Halt(_) => self.halt_timeout(now),
@@ -416,7 +432,7 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
 
     fn poll_timeout(&self) -> Time {
         let activity = match &self.activity {
-            Activity::Idle | Activity::Starting => Time::NEVER,
+            Activity::Idle | Activity::Starting | Activity::Reference { .. } => Time::NEVER,
             Activity::Power(power) => power.poll_timeout(),
             Activity::Move(moving) => moving.deadline(),
             Activity::Halt(halt) => halt.deadline(),

@@ -7,6 +7,7 @@ use units::{
     RadiansPerSecondSquared, Scale,
 };
 
+use crate::device::ReferenceProof;
 use crate::device::canopen_node::NodeSettings;
 
 /// Everything the driver must know about one drive. [`Cia402Settings::new`] leaves to the
@@ -50,6 +51,8 @@ pub struct Cia402Settings<Q: Coordinate = Metres> {
     pub homing_acceleration: Q::Acceleration,
     /// What 0x607C means to this drive.
     pub home_offset: HomeOffset,
+    /// How the drive proves that it has kept its reference; `None`: it cannot.
+    pub reference_proof: Option<ReferenceProof>,
     /// Whether TPDO 2 carries the following error (0x60F4).
     pub map_following_error: bool,
     /// Whether RPDO 1 takes effect at the next SYNC (transmission type 1) instead of at once, so
@@ -256,6 +259,7 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             stall_max: Duration::ZERO,
             homing_acceleration: acceleration_max * 0.1,
             home_offset: HomeOffset::IsPositionAtHome,
+            reference_proof: None,
             map_following_error: true,
             synchronous_start: false,
             timeouts: Cia402Timeouts::default(),

@@ -9,8 +9,8 @@ use wire::cia402::OperationMode;
 use super::convert::{acceleration_counts, counts_i32, distance_counts, velocity_counts};
 use super::latch;
 use super::settings::{Cia402Settings, PositionRange};
-use crate::device::DeviceError;
 use crate::device::canopen_node::millis;
+use crate::device::{DeviceError, ReferenceProof};
 use crate::protocol::pdo_setup::{Pdo, PdoDirection, PdoTooLong};
 use crate::protocol::script::{Script, Step};
 
@@ -274,6 +274,14 @@ pub(super) fn profile_steps(velocity: u32, acceleration: u32) -> Vec<Step> {
     ]
 }
 
+fn unmark<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Option<Step> {
+    let Some(ReferenceProof::Mark(object)) = settings.reference_proof else {
+        return None;
+    };
+    let text = "clearing the mark of its zero before homing";
+    Some(Step::check(object, 0_u32, text))
+}
+
 /// Homing parameters, then the mode.
 pub(super) fn homing_steps<Q: Coordinate>(
     settings: &Cia402Settings<Q>,
@@ -282,10 +290,12 @@ pub(super) fn homing_steps<Q: Coordinate>(
     speed: Option<Q::Speed>,
 ) -> Result<Vec<Step>, DeviceError> {
     const TEXT: &str = "setting the homing parameters";
-    let mut steps = vec![
+    // First of all: a homing that ends half-way must leave no mark of the zero before.
+    let mut steps: Vec<Step> = unmark(settings).into_iter().collect();
+    steps.extend([
         Step::check(HOME_OFFSET, offset, TEXT),
         Step::check(HOMING_METHOD, method, TEXT),
-    ];
+    ]);
     if let Some(speed) = speed {
         let search = velocity_counts(settings, HOMING_SPEED_SEARCH, speed)?;
         let acceleration =

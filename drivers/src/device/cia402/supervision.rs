@@ -78,7 +78,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
         self.supervise(&sample);
         match &self.activity {
-            Activity::Idle | Activity::Starting | Activity::Latch(_) => {}
+            Activity::Idle
+            | Activity::Starting
+            | Activity::Latch(_)
+            | Activity::Reference { .. } => {}
             Activity::Power(_) => self.advance_power(now),
             Activity::Move(_) => self.advance_move(now),
             Activity::Halt(_) => self.advance_halt(now),

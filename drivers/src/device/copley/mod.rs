@@ -397,6 +397,9 @@ impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
             DriveCommand::EnterCyclic { .. } | DriveCommand::LeaveCyclic => {
                 self.refuse("following cyclic set-points", "a drive on CAN");
             }
+            DriveCommand::ReadReference { .. } => {
+                self.refuse("reading its reference", "a drive on CAN");
+            }
         }
         self.pump(now);
     }

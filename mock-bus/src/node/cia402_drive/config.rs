@@ -69,6 +69,10 @@ pub struct Cia402DriveConfig {
     pub quick_stop_option: i16,
     /// 0x6007 at power-on: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
     pub abort_connection_option: i16,
+    /// The encoder is absolute and the drive stores its origin: both are there again after a power cycle.
+    pub absolute_encoder: bool,
+    /// Bit of the statusword (8, 14 or 15, which CiA 402 leaves to the manufacturer) that is 1 while the drive is homed.
+    pub homed_bit: Option<u8>,
     /// It moves a rotary axis: this takes the place of all lengths above.
     pub rotary: Option<RotaryDriveConfig>,
     /// It has a touch probe.
@@ -206,6 +210,8 @@ impl Default for Cia402DriveConfig {
             has_index: false,
             quick_stop_option: 6,
             abort_connection_option: 3,
+            absolute_encoder: false,
+            homed_bit: None,
             rotary: None,
             touch_probe: None,
             manners: Manners::default(),

@@ -26,6 +26,7 @@ mod positioning;
 mod power;
 mod status;
 mod supervision;
+mod supply;
 #[cfg(test)]
 mod tests;
 mod touch_probe;
@@ -241,6 +242,9 @@ struct Drive {
     /// Actual position = sign · encoder counts + offset.
     offset: i64,
     homed: bool,
+    /// Where the encoder began to count when its power came.
+    counted_from: i64,
+    encoder_runs: bool,
     profile: Profile,
     activity: Activity,
     positioning: Positioning,
@@ -285,6 +289,8 @@ impl Drive {
             mode_due: Time::NEVER,
             offset: 0,
             homed: false,
+            counted_from: 0,
+            encoder_runs: false,
             profile: Profile::resting(0.0),
             activity: Activity::Standing,
             positioning: Positioning::default(),
@@ -304,43 +310,6 @@ impl Drive {
             heartbeat_lost: false,
             internal_error: None,
         }
-    }
-
-    /// The processor starts: everything volatile has its power-on value, also the position
-    /// counter, which knows no origin.
-    fn boot(&mut self, m: &mut impl Mechanism) {
-        self.switch_off(m);
-        self.power = Power::NotReady;
-        self.command = None;
-        self.controlword = Controlword::empty();
-        self.mode_due = Time::NEVER;
-        self.homed = false;
-        self.offset = -self.sign() * m.counts();
-        self.profile = Profile::resting(0.0);
-        self.positioning = Positioning::default();
-        self.homing = HomingStatus::NotStarted;
-        self.internal_limit = false;
-        self.fault = None;
-        self.heartbeat_lost = false;
-        self.following_since = None;
-        self.in_window_since = None;
-        self.server.set(0x6040, 0, 0);
-        let mode = self.server.get(0x6060, 0);
-        self.server.set(0x6061, 0, mode);
-        self.look_now();
-    }
-
-    fn power_on(&mut self, now: Time, m: &mut impl Mechanism) {
-        m.encoder_power(true);
-        self.server.power_on(now);
-        self.boot(m);
-    }
-
-    fn power_off(&mut self, m: &mut impl Mechanism) {
-        self.switch_off(m);
-        self.power = Power::NotReady;
-        m.encoder_power(false);
-        self.server.power_off();
     }
 
     /// Looks after itself as soon as it is advanced.

@@ -205,6 +205,9 @@ fn insert_manufacturer(dictionary: &mut Dictionary) {
     dictionary.insert(0x2000, 0, log);
     let notebook = Entry::octets(Access::ReadWrite, NOTEBOOK_BYTES, b"notebook".to_vec());
     dictionary.insert(0x2001, 0, notebook);
+    // As many drives have them: numbers that mean nothing to it, and that it forgets without power.
+    let variable = || Entry::read_write(Kind::U32, 0);
+    dictionary.insert_array(0x2F00, vec![variable(), variable()]);
 }
 
 /// Communication objects; the default PDOs are those of EPOS4, so that a driver must remap.

@@ -27,7 +27,7 @@ impl Drive {
         let interlock = i64::from(self.safe_torque_off) << 3;
         let values = [
             (0x6062, self.shown(shown)),
-            (0x6063, m.counts()),
+            (0x6063, m.counts() - self.counted_from),
             (0x6064, self.shown(actual)),
             (0x606B, demand.velocity.round() as i64),
             (0x606C, sign * m.speed().round() as i64),
@@ -65,6 +65,9 @@ impl Drive {
         let mut status = state | Statusword::VOLTAGE_ENABLED;
         status.set(Statusword::REMOTE, !self.local_control);
         status.set(Statusword::INTERNAL_LIMIT, self.internal_limit);
+        if let Some(bit) = self.config.homed_bit.filter(|_| self.homed) {
+            status |= Statusword::from_bits_retain(1_u16.unbounded_shl(bit.into()));
+        }
         let enabled = self.power == Power::OperationEnabled;
         match self.mode() {
             HOMING if enabled => status | homing_bits(self.homing),

@@ -1,0 +1,93 @@
+//! Whether a drive has kept its reference while no controller looked after it.
+//!
+//! After a restart a controller knows nothing of where an axis is. Some drives can prove that their coordinates are
+//! still those of the last zero; which proof a drive offers is configured, because none is in CiA 402: bit 12 of the
+//! statusword ("homing attained") says so only in homing mode.
+
+use thiserror::Error;
+use wire::canopen::Object;
+
+/// What a drive proves its reference with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReferenceProof {
+    /// A number is written into this object at zeroing. It must have 32 bits, mean nothing to the drive, and be lost
+    /// with the drive's power: whoever still finds the number there knows that the drive was never without it.
+    Mark(Object),
+    /// The drive says itself whether it is homed, by a bit of an object.
+    HomedBit {
+        /// Such as 0x6041:00 of a drive that has a bit of its own for it.
+        object: Object,
+        /// From 0, the lowest.
+        bit: u8,
+    },
+    /// The encoder is absolute, and the drive keeps what it adds to the encoder's position (0x6063) without power.
+    AbsoluteEncoder,
+}
+
+/// What a drive shows of its reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DriveReference {
+    /// What is in the object of [`ReferenceProof::Mark`].
+    pub mark: Option<u32>,
+    /// The bit of [`ReferenceProof::HomedBit`].
+    pub homed: Option<bool>,
+    /// 0x6098, as it was written last.
+    pub method: u32,
+    /// 0x607C, as it was written last.
+    pub home_offset: u32,
+    /// 0x6064, position units.
+    pub position: i32,
+    /// 0x6063, encoder increments, where the drive has it.
+    pub increments: Option<i32>,
+    /// By how many increments it changed while the position was read.
+    pub moved: u32,
+    /// 0x603F, where the drive has it; 0: none.
+    pub error_code: u32,
+}
+
+/// Why a drive's coordinates are not taken for those of its last zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum ReferenceLost {
+    /// Its power was off, or another program has zeroed it.
+    #[error(
+        "the mark {expected:#010X} that was written into the drive at its zero is not there (seen: {seen:#010X}); \
+         its power was off, or it was homed by somebody else"
+    )]
+    Mark {
+        /// What was written.
+        expected: u32,
+        /// What is there now.
+        seen: u32,
+    },
+    /// By its own word.
+    #[error("the drive itself says that it is not homed")]
+    NotHomed,
+    /// Somebody has written what homing uses.
+    #[error("{object} is {seen:#X} and no longer {expected:#X}; somebody else has homed the drive")]
+    Homed {
+        /// The homing method or the home offset.
+        object: Object,
+        /// As our zero left it.
+        expected: u32,
+        /// As it is now.
+        seen: u32,
+    },
+    /// The drive adds something else to the encoder's position than it did.
+    #[error(
+        "position (0x6064) and encoder (0x6063) are {counts} counts farther apart than at its zero: the origin \
+         was moved, or encoder or drive were without power"
+    )]
+    Shifted {
+        /// By so many position units.
+        counts: i64,
+    },
+    /// 0x6063 is not there, and without it an absolute encoder proves nothing.
+    #[error("the drive has no encoder position (0x6063) to compare its coordinates with")]
+    NoEncoder,
+    /// It found something wrong meanwhile.
+    #[error("the drive reports error {code:#06X}")]
+    Fault {
+        /// 0x603F.
+        code: u32,
+    },
+}

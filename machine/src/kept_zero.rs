@@ -1,0 +1,196 @@
+//! The zero of an axis over a restart, where its drive proves that it has kept its reference.
+//!
+//! When an axis has its zero, what its drive shows of it is noted beside the machine's records; before it loses it, the
+//! note goes. A start compares the two ([`drivers::device::ReferenceProof`]), and an axis without a note, or with one
+//! that does not fit, has no zero. The order makes any moment safe to die in: the note is never older than the zero.
+
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use drivers::device::{DriveCommand, DriveReference};
+
+use crate::failure::Failure;
+use crate::machine::Machine;
+use crate::records::IdentityRecord;
+use crate::stopping::STOP_LIMIT;
+use crate::zero_notes::{KeptZeros, Note, VERSION};
+
+/// Notes in `folder` what the drives of `machine` show of their reference, of those that prove it, and believes at a start
+/// what was noted of a machine of the same `configuration` (its hash).
+pub fn keep(machine: &mut Machine, folder: PathBuf, configuration: String) {
+    machine.kept_zeros = Some(KeptZeros {
+        folder,
+        configuration,
+    });
+}
+
+/// Whether the drive of `axis` can prove that it kept its zero over a restart.
+pub fn is_proved(machine: &Machine, axis: &str) -> bool {
+    let at = machine.devices.drive_index(axis);
+    at.is_ok_and(|at| machine.devices.drive(at).proves_reference())
+}
+
+impl Machine {
+    /// Says that `axis` has its zero, until its drive loses power or the machine is started anew;
+    /// or that it has none.
+    ///
+    /// # Errors
+    /// When there is no such axis; when what was noted of an earlier zero cannot be removed
+    /// ([`keep`]).
+    pub fn set_zeroed(&mut self, axis: &str, zeroed: bool) -> Result<(), Failure> {
+        let at = self.devices.drive_index(axis)?;
+        self.zeroed[at] = false;
+        forget(self, at)?;
+        if zeroed {
+            note_zero(self, at)?;
+            self.zeroed[at] = true;
+        }
+        Ok(())
+    }
+}
+
+/// The axis has its zero: its drive is marked, and what it shows noted. That the drive refuses takes the zero from nobody;
+/// a restart will only know nothing of it.
+fn note_zero(machine: &mut Machine, at: usize) -> Result<(), Failure> {
+    if machine.kept_zeros.is_none() || !machine.devices.drive(at).proves_reference() {
+        return Ok(());
+    }
+    if let Err(why) = mark_and_note(machine, at)? {
+        let axis = machine.devices.name(at);
+        machine.notices.warn(format!(
+            "axis {axis}: its zero will not outlast a restart: {why}"
+        ));
+    }
+    Ok(())
+}
+
+/// Has the drive show its reference, after it was marked; why it cannot. What stops the machine stops it here, too.
+fn read(
+    machine: &mut Machine,
+    at: usize,
+    mark: Option<u32>,
+) -> Result<Result<DriveReference, String>, Failure> {
+    let command = DriveCommand::ReadReference { mark };
+    match machine.control(at, command, "reading its reference", STOP_LIMIT) {
+        Ok(()) => {}
+        Err(refused @ (Failure::Device { .. } | Failure::Overdue { .. })) => {
+            return Ok(Err(refused.to_string()));
+        }
+        Err(failure) => return Err(failure),
+    }
+    let shown = machine.devices.drive(at).reference();
+    Ok(shown.ok_or_else(|| "the drive showed nothing".to_owned()))
+}
+
+fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>, Failure> {
+    let axis = machine.devices.name(at);
+    let shown = match read(machine, at, Some(unlike_any_other(&axis)))? {
+        Ok(shown) => shown,
+        Err(why) => return Ok(Err(why)),
+    };
+    let Some(kept) = &machine.kept_zeros else {
+        return Ok(Ok(()));
+    };
+    let note = Note {
+        schema_version: VERSION,
+        configuration: kept.configuration.clone(),
+        drive: drive_record(machine, at),
+        mark: shown.mark,
+        homed: shown.homed,
+        homing_method: shown.method,
+        home_offset: shown.home_offset,
+        position_counts: shown.position,
+        encoder_increments: shown.increments,
+        moved_increments: shown.moved,
+        error_code: shown.error_code,
+        axis,
+    };
+    Ok(kept.write(&note).map_err(|it| it.to_string()))
+}
+
+/// The axis has no zero any more, or is about to be moved somewhere else by a search for it.
+pub(crate) fn forget(machine: &Machine, at: usize) -> Result<(), Failure> {
+    match &machine.kept_zeros {
+        Some(kept) if machine.devices.drive(at).proves_reference() => {
+            kept.forget(&machine.devices.name(at))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// At a start, everything stands: gives their zeros back to the axes whose drives have kept their reference.
+///
+/// # Errors
+/// Whatever stops the machine. That a drive does not prove it is none: its axis has no zero then.
+pub(crate) fn take_up(machine: &mut Machine) -> Result<(), Failure> {
+    for at in 0..machine.devices.drive_count() {
+        if !machine.devices.drive(at).proves_reference() {
+            continue;
+        }
+        let axis = machine.devices.name(at);
+        let Some(note) = machine.kept_zeros.as_ref().and_then(|it| it.read(&axis)) else {
+            continue;
+        };
+        match still_holds(machine, at, &note)? {
+            Ok(()) => machine.zeroed[at] = true,
+            Err(why) => machine.notices.warn(format!(
+                "axis {axis}: it must be zeroed again, its zero was not kept: {why}"
+            )),
+        }
+    }
+    Ok(())
+}
+
+fn still_holds(
+    machine: &mut Machine,
+    at: usize,
+    note: &Note,
+) -> Result<Result<(), String>, Failure> {
+    if let Some(other) = is_of_another(machine, at, note) {
+        return Ok(Err(other.into()));
+    }
+    if let Err(why) = read(machine, at, None)? {
+        return Ok(Err(why));
+    }
+    let taken_up = machine
+        .devices
+        .drive_mut(at)
+        .take_up_reference(&note.reference());
+    Ok(taken_up.map_err(|it| it.to_string()))
+}
+
+/// Why a note says nothing of this axis, whatever its drive shows.
+fn is_of_another(machine: &Machine, at: usize, note: &Note) -> Option<&'static str> {
+    let configuration = machine
+        .kept_zeros
+        .as_ref()
+        .map(|it| it.configuration.as_str());
+    if note.schema_version != VERSION {
+        Some("another version of this program has noted it")
+    } else if note.axis != machine.devices.name(at)
+        || Some(note.configuration.as_str()) != configuration
+    {
+        Some("the configuration was changed since")
+    } else if note.drive != drive_record(machine, at) {
+        Some("it is another drive")
+    } else {
+        None
+    }
+}
+
+fn drive_record(machine: &Machine, at: usize) -> IdentityRecord {
+    let identity = machine.devices.drive(at).identity();
+    identity
+        .as_ref()
+        .map(IdentityRecord::from)
+        .unwrap_or_default()
+}
+
+/// A mark that no earlier zero has left: of the axis and the time. Never 0, which is what nobody wrote.
+fn unlike_any_other(axis: &str) -> u32 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let nanos = now.map_or(0, |it| it.as_nanos());
+    let hash = blake3::hash(format!("{axis} {nanos} {}", std::process::id()).as_bytes());
+    let [a, b, c, d, ..] = *hash.as_bytes();
+    u32::from_le_bytes([a, b, c, d]).max(1)
+}

@@ -1,0 +1,87 @@
+//! What is noted of zeros: a file for each axis whose drive can prove that it kept its reference.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+use drivers::device::DriveReference;
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::records::{IdentityRecord, StoreError, opened, sealed, write_new_or_replace};
+
+/// Of the note. One of another version is none.
+pub(crate) const VERSION: u32 = 1;
+
+/// Where the notes are, and of which configuration.
+#[derive(Debug)]
+pub(crate) struct KeptZeros {
+    pub(crate) folder: PathBuf,
+    pub(crate) configuration: String,
+}
+
+/// What was so when the axis had its zero.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Note {
+    pub(crate) schema_version: u32,
+    pub(crate) axis: String,
+    /// Of the whole configuration: another one may mean other places by the same counts.
+    pub(crate) configuration: String,
+    pub(crate) drive: IdentityRecord,
+    pub(crate) mark: Option<u32>,
+    pub(crate) homed: Option<bool>,
+    pub(crate) homing_method: u32,
+    pub(crate) home_offset: u32,
+    pub(crate) position_counts: i32,
+    pub(crate) encoder_increments: Option<i32>,
+    pub(crate) moved_increments: u32,
+    pub(crate) error_code: u32,
+}
+
+impl Note {
+    pub(crate) const fn reference(&self) -> DriveReference {
+        DriveReference {
+            mark: self.mark,
+            homed: self.homed,
+            method: self.homing_method,
+            home_offset: self.home_offset,
+            position: self.position_counts,
+            increments: self.encoder_increments,
+            moved: self.moved_increments,
+            error_code: self.error_code,
+        }
+    }
+}
+
+impl KeptZeros {
+    fn path(&self, axis: &str) -> PathBuf {
+        self.folder.join(format!("{axis}.json"))
+    }
+
+    pub(crate) fn read(&self, axis: &str) -> Option<Note> {
+        let text = fs::read_to_string(self.path(axis)).ok()?;
+        let json = opened(text.trim_end()).ok()?;
+        serde_json::from_str(&json).ok()
+    }
+
+    /// Takes it away.
+    ///
+    /// # Errors
+    /// When there is one and it cannot be removed: it would be believed at the next start.
+    pub(crate) fn forget(&self, axis: &str) -> Result<(), Failure> {
+        let path = self.path(axis);
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != ErrorKind::NotFound => {
+                Err(Failure::ZeroNoted { path, source })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// # Errors
+    /// When it cannot be written; there is none then.
+    pub(crate) fn write(&self, note: &Note) -> Result<(), StoreError> {
+        let json = serde_json::to_string(note).expect("a note is an object");
+        write_new_or_replace(&self.path(&note.axis), sealed(&json).as_bytes())
+    }
+}
