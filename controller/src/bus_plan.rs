@@ -1,6 +1,7 @@
 //! What a configuration puts on each CAN bus, and whether it fits.
 
 use core::time::Duration;
+use std::collections::BTreeMap;
 
 use drivers::protocol::bus_load::{BusLoad, BusLoadError, BusPlan};
 
@@ -13,6 +14,13 @@ const DRIVE_PDO_BYTES: [u8; 2] = [7, 4];
 const SET_POINT_PDO_BYTES: u8 = 6;
 /// A touch probe adds its status, a position and a count.
 const LATCH_PDO_BYTES: u8 = 8;
+
+/// What the devices of each CAN bus put on it while the machine runs, as a share of it, 0 to 1.
+pub(crate) fn loads(config: &MachineConfig) -> BTreeMap<String, f64> {
+    let each = config.can.keys();
+    let fitting = each.filter_map(|name| Some((name.clone(), load(config, name).ok()?.load)));
+    fitting.collect()
+}
 
 /// The load of CAN bus `name`.
 ///

@@ -436,6 +436,11 @@ impl Desk {
         }
     }
 
+    /// The time by its clock when it said last how it is, in seconds.
+    pub(crate) fn clock_s(&self) -> f64 {
+        self.snapshot().now.seconds()
+    }
+
     /// Its axes.
     pub fn axes(&self) -> Vec<AxisView> {
         self.snapshot().axes_of(&self.shared.fixed)

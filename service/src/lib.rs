@@ -38,8 +38,8 @@ pub use manager::Manager;
 pub use problem::{Code, Problem, ProblemBody};
 pub use quantity::{Quantity, Speed};
 pub use request::{
-    AnswerRequest, Caller, GivenFile, IfMoving, JogRequest, LeaseRequest, MoveRequest, PathRows,
-    PathTable, RunKind, RunRequest, StopMode, Target, WayName,
+    AnswerRequest, ApproachName, Caller, GivenFile, IfMoving, JogRequest, LeaseRequest,
+    MoveRequest, PathRows, PathTable, RunKind, RunRequest, StopMode, Target, WayName,
 };
 pub use thread::{Opened, Service, StartError};
 pub use view::{

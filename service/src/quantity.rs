@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use units::{AxisSpeed, Metres, Radians, text};
+use units::{AxisSpeed, Metres, MetresPerSecond, Radians, RadiansPerSecond, text};
 use utoipa::ToSchema;
 
 mod form;
@@ -18,7 +18,7 @@ use crate::coordinate::Coordinate;
 pub struct Quantity {
     /// How much.
     pub value: f64,
-    /// Of what: `mm`, `um`, `deg`, `arcsec`, `mm/s`, `rad/s`.
+    /// Of what: `mm`, `um`, `deg`, `arcsec`, `mm/s`, `deg/s`.
     pub unit: String,
 }
 
@@ -52,6 +52,22 @@ impl Quantity {
         Self {
             value: angle.arcsec(),
             unit: "arcsec".into(),
+        }
+    }
+
+    /// A speed along a way, in millimetres per second.
+    pub fn mm_per_s(speed: MetresPerSecond) -> Self {
+        Self {
+            value: speed.value() * 1e3,
+            unit: "mm/s".into(),
+        }
+    }
+
+    /// A speed of what turns, in degrees per second.
+    pub fn deg_per_s(speed: RadiansPerSecond) -> Self {
+        Self {
+            value: speed.value().to_degrees(),
+            unit: "deg/s".into(),
         }
     }
 

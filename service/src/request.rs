@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use truestage::rotary::Way;
 use truestage::runs::Group;
 use truestage::volumetric::MemoryName;
+use units::Approach;
 use utoipa::ToSchema;
 
 mod given;
@@ -57,6 +58,11 @@ pub struct MoveRequest {
     /// Which way round an axis goes that turns; the shortest when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub way: Option<WayName>,
+    /// From which side an axis arrives that goes along a way, so that its lost motion is taken up in the same way each time:
+    /// over `approach_mm` of its configuration or, where that says none, the overrun of its calibrations. As its
+    /// configuration has it when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub approach: Option<ApproachName>,
     /// What happens when one of the axes is in use.
     #[serde(default)]
     pub if_moving: IfMoving,
@@ -89,6 +95,7 @@ impl MoveRequest {
             targets: [(axis.to_owned(), target.into())].into(),
             speed: None,
             way: None,
+            approach: None,
             if_moving: IfMoving::default(),
             uncompensated: false,
             beyond: false,
@@ -110,6 +117,25 @@ pub enum WayName {
     Reverse,
     /// As many turns as the angle says, from the zero.
     Turns,
+}
+
+/// From which side an axis arrives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ApproachName {
+    /// With growing positions.
+    Forward,
+    /// With falling positions.
+    Reverse,
+}
+
+impl From<ApproachName> for Approach {
+    fn from(name: ApproachName) -> Self {
+        match name {
+            ApproachName::Forward => Self::Forward,
+            ApproachName::Reverse => Self::Reverse,
+        }
+    }
 }
 
 impl From<WayName> for Way {

@@ -7,9 +7,11 @@ use truestage::runs::JudgedPath;
 use utoipa::ToSchema;
 
 mod chosen;
+mod event;
 mod told;
 
 pub use chosen::{CalibrationView, ChangeView, ChosenView};
+pub use event::Event;
 pub use told::{StoredView, ToldView};
 
 use crate::problem::Code;
@@ -235,6 +237,10 @@ pub struct LegView {
     pub target: Quantity,
     /// What the drive was sent for that, once it was.
     pub set_point: Option<Quantity>,
+    /// How fast it goes: as was asked, but no faster than its configuration and its correction allow. Null of axes that move as
+    /// one.
+    #[serde(default)]
+    pub speed: Option<Quantity>,
     /// Whether a calibration corrects it: `no`, `yes`, `held` or `fading` (beyond the calibrated range).
     pub corrected: String,
     /// Where it stood at the end.
@@ -290,6 +296,10 @@ pub struct RunPlanView {
     pub seconds_at_least: f64,
     /// What a person will be asked to do.
     pub asks: Vec<String>,
+    /// By name, the share of each CAN bus that frames take meanwhile, 0 to 1. `truestage_bus_load_ratio` of the metrics is what was
+    /// measured.
+    #[serde(default)]
+    pub bus_load: BTreeMap<String, f64>,
     /// What joins the rows of a path: `spline`, or `linear` with how far from a corner it may pass.
     #[serde(default)]
     pub join: Option<String>,
@@ -308,6 +318,7 @@ impl RunPlanView {
             travel: Some(Quantity::mm(judged.travel)),
             seconds_at_least: judged.takes.as_secs_f64(),
             asks: Vec::new(),
+            bus_load: BTreeMap::new(),
             join: Some(judged.path.join.to_string()),
             departure: Some(DepartureView {
                 size: Quantity::mm(departure.size),
@@ -473,23 +484,4 @@ pub struct JournalView {
     pub started: Option<String>,
     /// Whether its run came to its end.
     pub complete: bool,
-}
-
-/// Something that happened.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Event {
-    /// Its number; the next one has the next.
-    pub id: u64,
-    /// When, UTC, RFC 3339.
-    pub at: String,
-    /// When by the machine's clock, in seconds.
-    pub clock_s: f64,
-    /// What: `machine`, `axis`, `position`, `motion`, `run`, `stop`, `lease`,
-    /// `calibration`, `question`, `point`, `warning`.
-    pub kind: String,
-    /// Of which axis, motion or run; empty for the machine.
-    pub of: String,
-    /// What is to be said of it.
-    #[schema(value_type = Object)]
-    pub data: serde_json::Value,
 }

@@ -121,6 +121,8 @@ fn what_the_verb_would_refuse_is_refused() {
     let words = ["move", "x=99mm", "--uncompensated", "--dry-run"];
     refused(LINEAR, &words, 3, "soft limits");
     refused(LINEAR, &["move", "y=1mm", "--dry-run"], 2, "no axis `y`");
+    let words = ["move", "c=5deg", "--approach", "forward", "--dry-run"];
+    refused(ROTARY, &words, 2, "--approach is for linear axes");
     let words = ["zero", "--axis", "x1", "--dry-run"];
     refused(GANTRY, &words, 2, "a side of the gantry beam");
     let words = ["calibrate", "--axis", "u", "--dry-run"];

@@ -85,6 +85,9 @@ fn a_machine_is_kept_zeroed_over_many_requests_and_given_back_at_the_end() {
         let status = bench.run(&["status"]).with_code(0);
         assert_eq!(status["machine"]["state"], "running", "{status}");
         assert_eq!(status["axes"][0]["homed"], true, "{status}");
+        // Wherever it listens, the machine's records say so.
+        let named = bench.run(&["status", "machine.toml"]).with_code(0);
+        assert_eq!(named["machine"]["name"], status["machine"]["name"]);
         // Slowly: it would take minutes.
         let body = json!({"targets": {"x": "60mm"}, "speed": "0.1mm/s", "uncompensated": true});
         let (status, motion) = ask(folder, "POST /v1/motions", &body);

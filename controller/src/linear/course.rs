@@ -24,6 +24,9 @@ pub struct Course {
     pub(crate) approach: Option<Metres>,
     /// Over which distance moves arrive, where the configuration says one.
     pub(crate) arrives_over: Option<Metres>,
+    /// Over which distance they arrive from a side that is asked for, where the configuration says none: what calibrations
+    /// begin beyond their first position.
+    pub(crate) overrun: Option<Metres>,
     /// Standard uncertainty of the zero that was found last.
     pub(crate) zero: Option<Metres>,
 }
@@ -126,6 +129,47 @@ impl Course {
         Ok(planned)
     }
 
+    /// The move of `axis` to `target` that ends with an approach from the side that `approach` begins at, unless that is how it
+    /// came there last: lost motion is then taken up as whoever asks wants it. Over `approach_mm` of the configuration or,
+    /// where that says none, over the overrun of its calibrations.
+    ///
+    /// # Errors
+    /// As [`Self::plan`]; outside the soft limits where the approach begins; no length of an approach is configured.
+    pub fn plan_from(
+        &self,
+        machine: &machine::Machine,
+        axis: &str,
+        target: Metres,
+        approach: Approach,
+    ) -> Result<PlannedMove, Failure> {
+        machine.require_zeroed(axis)?;
+        let is_free = |place| Ok(machine.check_soft_limits(axis, place)?);
+        is_free(target)?;
+        let length = self.arrives_over.or(self.overrun);
+        let length = length.ok_or_else(|| no_length(axis))?;
+        let (from, set_point) =
+            self.arrival_from((axis, approach), (target, length), Correction::On, &is_free)?;
+        let tracker = machine.approach(axis)?;
+        let came_so = tracker.approach() == Some(approach) && was_sent_to(&tracker, set_point);
+        let begins_there = was_sent_to(&tracker, from);
+        Ok(PlannedMove {
+            by_way_of: (!came_so && !begins_there).then_some(from),
+            set_point,
+            speed: self.speed(machine, axis, Correction::On)?,
+            corrected: self.corrected_by(Correction::On, target),
+        })
+    }
+
+    /// What leads the axis by its encoder alone.
+    #[must_use]
+    pub fn uncompensated(&self) -> Self {
+        Self {
+            overrun: self.arrives_over.or(self.overrun),
+            zero: self.zero,
+            ..Self::default()
+        }
+    }
+
     /// The same without asking for a zero.
     pub(crate) fn plan_anywhere(
         &self,
@@ -179,14 +223,23 @@ impl Course {
         is_free: &dyn Fn(Metres) -> Result<(), Failure>,
     ) -> Result<(Metres, Metres), Failure> {
         is_free(target)?;
-        let from_side = |side: Approach| {
-            let set_point = self.set_point_from(axis, target, side, correction)?;
-            let from = set_point - length * side.sign();
-            is_free(set_point).and_then(|()| is_free(from))?;
-            Ok((from, set_point))
-        };
+        let of_side = |side| self.arrival_from((axis, side), (target, length), correction, is_free);
         let usual = start.approach_of(target).unwrap_or(Approach::Forward);
-        from_side(usual).or_else(|_: Failure| from_side(usual.opposite()))
+        of_side(usual).or_else(|_: Failure| of_side(usual.opposite()))
+    }
+
+    /// The same from one side.
+    fn arrival_from(
+        &self,
+        (axis, side): (&str, Approach),
+        (target, length): (Metres, Metres),
+        correction: Correction,
+        is_free: &dyn Fn(Metres) -> Result<(), Failure>,
+    ) -> Result<(Metres, Metres), Failure> {
+        let set_point = self.set_point_from(axis, target, side, correction)?;
+        let from = set_point - length * side.sign();
+        is_free(set_point).and_then(|()| is_free(from))?;
+        Ok((from, set_point))
     }
 
     /// So fast that the correction changes no faster than its limit.
@@ -326,6 +379,15 @@ fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
 }
 
 /// Whether that was the set-point of the last motion.
+fn no_length(axis: &str) -> Failure {
+    Failure::Usage {
+        what: format!(
+            "axis {axis}: nothing says over which length it approaches a place; nothing was moved"
+        ),
+        help: format!("give approach_mm in [axis.{axis}.compensation], or leave the approach out"),
+    }
+}
+
 fn was_sent_to(tracker: &ApproachTracker, place: Metres) -> bool {
     let last = tracker.last();
     last.is_some_and(|it| (it - place).abs() <= ROUNDING)

@@ -48,6 +48,25 @@ impl LinearStage<'_> {
         self.move_and_settle(target, STAND)
     }
 
+    /// The same with an approach from a side, where one is asked for ([`Self::move_to_from`]).
+    ///
+    /// # Errors
+    /// As [`Self::move_and_read`] and [`Self::move_to_from`].
+    pub fn move_and_read_from(
+        &mut self,
+        target: Metres,
+        approach: Option<Approach>,
+    ) -> Result<Moved, Failure> {
+        match approach {
+            None => self.move_and_read(target),
+            Some(approach) => {
+                let corrected = self.memory.course.corrected(target);
+                let set_point = self.move_to_from(target, approach)?;
+                self.read_moved((target, set_point), corrected, STAND)
+            }
+        }
+    }
+
     /// The same once the axis has stood for `settle`.
     ///
     /// # Errors
@@ -55,6 +74,15 @@ impl LinearStage<'_> {
     pub fn move_and_settle(&mut self, target: Metres, settle: Duration) -> Result<Moved, Failure> {
         let corrected = self.memory.course.corrected(target);
         let set_point = self.move_to(target)?;
+        self.read_moved((target, set_point), corrected, settle)
+    }
+
+    fn read_moved(
+        &mut self,
+        (target, set_point): (Metres, Metres),
+        corrected: Corrected,
+        settle: Duration,
+    ) -> Result<Moved, Failure> {
         self.core.stand_still(self.axis, settle)?;
         let reading = self.core.reading(self.axis)?;
         let encoder = reading.expect("an axis that moved has been read").position;

@@ -57,7 +57,7 @@ fn planned(machine: &mut Machine, axis: &str, task: &Task) -> Result<Planned, Fa
         points: plan.points,
         travel: Some(Travel::Length(plan.travel)),
         at_least: plan.at_least,
-        asks: Vec::new(),
+        ..Planned::default()
     })
 }
 

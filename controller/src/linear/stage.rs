@@ -82,6 +82,7 @@ impl LinearStage<'_> {
     pub fn course(&self) -> Course {
         Course {
             arrives_over: self.approach_length(),
+            overrun: self.overrun(),
             ..self.memory.course.clone()
         }
     }

@@ -30,6 +30,7 @@ pub(crate) fn stored_course(
         budget: record.content.axis_budget(&id)?,
         approach: record.content.approach_m.map(Metres),
         arrives_over: None,
+        overrun: None,
         zero: None,
     };
     Ok(Some((id, course)))

@@ -1,9 +1,10 @@
 //! Moves that are waited for.
 
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
+use crate::linear::course::PlannedMove;
 use crate::linear::stage::LinearStage;
 
 impl LinearStage<'_> {
@@ -19,6 +20,26 @@ impl LinearStage<'_> {
         self.arrive(target, Correction::On)
     }
 
+    /// [`Self::move_to`] with an approach from the side that `approach` begins at ([`Course::plan_from`](crate::linear::Course::plan_from)).
+    ///
+    /// # Errors
+    /// As [`Self::move_to`] and [`Course::plan_from`](crate::linear::Course::plan_from).
+    pub fn move_to_from(&mut self, target: Metres, approach: Approach) -> Result<Metres, Failure> {
+        let planned = self
+            .course()
+            .plan_from(self.core.machine, self.axis, target, approach)?;
+        self.follow(&planned)
+    }
+
+    fn follow(&mut self, planned: &PlannedMove) -> Result<Metres, Failure> {
+        if let Some(from) = planned.by_way_of {
+            self.core.profile_move(self.axis, from, planned.speed)?;
+        }
+        self.core
+            .profile_move(self.axis, planned.set_point, planned.speed)?;
+        Ok(planned.set_point)
+    }
+
     /// Moves without asking for a zero: procedures that make the zero use it too.
     pub(crate) fn travel(
         &mut self,
@@ -27,9 +48,7 @@ impl LinearStage<'_> {
     ) -> Result<Metres, Failure> {
         let course = &self.memory.course;
         let planned = course.plan_anywhere(self.core.machine, self.axis, target, correction)?;
-        self.core
-            .profile_move(self.axis, planned.set_point, planned.speed)?;
-        Ok(planned.set_point)
+        self.follow(&planned)
     }
 
     /// Moves to `target` as [`Self::travel`], so that the move ends with an approach over the length of the
@@ -44,17 +63,18 @@ impl LinearStage<'_> {
         };
         let (course, to) = (&self.memory.course, (target, length));
         let planned = course.plan_arrival(self.core.machine, self.axis, to, correction)?;
-        if let Some(from) = planned.by_way_of {
-            self.core.profile_move(self.axis, from, planned.speed)?;
-        }
-        self.core
-            .profile_move(self.axis, planned.set_point, planned.speed)?;
-        Ok(planned.set_point)
+        self.follow(&planned)
     }
 
     /// The length of approaches, where the configuration says one.
     pub(crate) fn approach_length(&self) -> Option<Metres> {
         let own = self.config.compensation.as_ref();
         own.and_then(|it| it.approach_mm).map(Metres::from_mm)
+    }
+
+    /// By how much the ends of calibrations are overrun, where there are any.
+    pub(crate) fn overrun(&self) -> Option<Metres> {
+        let own = self.config.calibrate.as_ref()?;
+        (own.overrun_mm > 0.0).then(|| Metres::from_mm(own.overrun_mm))
     }
 }

@@ -1,8 +1,11 @@
 //! What is run on an alignment platform for whoever keeps a machine: all of its screws together.
 
+use core::time::Duration;
+
 use machine::Stage;
 use machine::records::Store;
 use serde_json::json;
+use units::Metres;
 
 use crate::config::MachineConfig;
 use crate::connected::Machine;
@@ -10,7 +13,9 @@ use crate::failure::Failure;
 use crate::platform::target::parts;
 use crate::platform::together::MOVES;
 use crate::platform::{PlatformFailure, PlatformTeller};
-use crate::runs::{Change, Found, Group, GroupRuns, Moved, Planned, Task, Work, each_usable};
+use crate::runs::{
+    Change, Found, Group, GroupRuns, Moved, Planned, Task, Travel, Work, each_usable, standing,
+};
 
 /// What its screws are called together.
 const WHOLE: &str = "platform";
@@ -67,23 +72,45 @@ fn planned(machine: &mut Machine, _: &str, task: &Task) -> Result<Planned, Failu
     let platform = machine.platform()?;
     let config = platform.config;
     let missing = |section| PlatformFailure::NotConfigured { section };
-    let points = match task.stage {
+    let settle = Duration::from_millis(config.settle_ms.into());
+    match task.stage {
         Stage::Calibrate => {
             let own = config.calibrate.as_ref().ok_or(missing("calibrate"))?;
-            let strokes = config.actuator.iter().map(|it| own.strokes_of(it));
-            let places: usize = strokes.map(|it| it.targets().len()).sum();
-            2 * places as u64 * u64::from(own.runs)
+            let strokes: Vec<_> = config
+                .actuator
+                .iter()
+                .map(|it| own.strokes_of(it))
+                .collect();
+            let places: usize = strokes.iter().map(|it| it.targets().len()).sum();
+            let points = 2 * places as u64 * u64::from(own.runs);
+            // There and back in each run.
+            let ways = strokes.iter().map(|it| 2.0 * (it.last_mm - it.first_mm));
+            let travel = Metres::from_mm(ways.sum::<f64>() * f64::from(own.runs));
+            let axes = config
+                .actuator
+                .iter()
+                .filter_map(|it| platform.core.config.axis.get(&it.axis));
+            let speeds = axes.map(|it| it.motion.speed_mm_per_s * 1e-3);
+            let moving = travel.value() / speeds.fold(0.0, f64::max);
+            let moving = Duration::try_from_secs_f64(moving).unwrap_or_default();
+            Ok(Planned {
+                points,
+                travel: Some(Travel::Length(travel)),
+                at_least: moving + standing(settle, points),
+                ..Planned::default()
+            })
         }
         Stage::Verify => {
             let own = config.verify.as_ref().ok_or(missing("verify"))?;
-            u64::from(own.poses)
+            let points = u64::from(own.poses);
+            Ok(Planned {
+                points,
+                at_least: standing(settle, points),
+                ..Planned::default()
+            })
         }
-        Stage::Zero | Stage::Reference | Stage::Job => 0,
-    };
-    Ok(Planned {
-        points,
-        ..Planned::default()
-    })
+        Stage::Zero | Stage::Reference | Stage::Job => Ok(Planned::default()),
+    }
 }
 
 fn perform(work: Work<'_>, _: &str, task: &Task) -> Result<Found, Failure> {

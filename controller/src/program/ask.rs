@@ -11,8 +11,9 @@ use crate::program::output::{Ended, Output};
 
 /// What the machine and its axes are.
 pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
-    let machine = ask(&args.at, "GET", "/v1/machine", "")?;
-    let axes = ask(&args.at, "GET", "/v1/axes", "")?;
+    let at = args.place()?;
+    let machine = ask(&at, "GET", "/v1/machine", "")?;
+    let axes = ask(&at, "GET", "/v1/axes", "")?;
     let text = text_of(&machine, &axes);
     output.result(&text, &json!({"machine": machine, "axes": axes}))
 }
@@ -21,7 +22,7 @@ pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
 pub(crate) fn stop(args: &ServiceArgs, quick: bool, output: Output) -> Ended {
     let mode = if quick { "quick" } else { "controlled" };
     let body = json!({"mode": mode}).to_string();
-    let answer = ask(&args.at, "POST", "/v1/stop", &body)?;
+    let answer = ask(&args.place()?, "POST", "/v1/stop", &body)?;
     output.result(&format!("a {mode} stop is under way"), &answer)
 }
 

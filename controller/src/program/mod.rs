@@ -18,6 +18,7 @@ mod demo;
 mod doctor;
 mod exchange;
 mod explain;
+mod found;
 mod intended;
 mod jog;
 mod jogs;
@@ -28,6 +29,7 @@ mod kind;
 mod linear;
 mod made_from;
 mod monitor;
+mod move_args;
 mod new;
 mod operator;
 mod output;
@@ -64,12 +66,13 @@ mod volumetric;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use wire::lockstep::path_of;
 
 use crate::ports::Pace;
-use crate::{Agreed, Failure, made_by};
+use crate::{Failure, made_by};
 use intended::Intent;
+use move_args::{AgreedArgs, ApproachName, MoveArgs, WayName, only_for};
 use output::{Ended, Output, SaidArgs};
 use refused::not_understood;
 use rotary::readings::ReadingsArgs;
@@ -309,114 +312,18 @@ struct VerifyArgs {
     readings: ReadingsArgs,
 }
 
-/// Which way round a rotary axis goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum WayName {
-    /// Less than half a turn.
-    Shortest,
-    /// With growing angles, less than a turn.
-    Forward,
-    /// With falling angles, less than a turn.
-    Reverse,
-    /// As many turns as the angle says, from the zero.
-    Turns,
-}
-
-#[derive(Clone, Debug, Args)]
-struct MoveArgs {
-    #[command(flatten)]
-    machine: MachineArgs,
-    /// Where to: `x=12.5mm`, `x=-300um`; a platform also `theta=20arcsec`, a rotary axis `c=90deg`.
-    #[arg(value_name = "AXIS=PLACE")]
-    targets: Vec<String>,
-    /// Keep moving a platform until the image agrees.
-    #[arg(long)]
-    align: bool,
-    /// Which way round a rotary axis goes; the shortest when not given.
-    #[arg(long, value_enum)]
-    way: Option<WayName>,
-    #[command(flatten)]
-    agreed: AgreedArgs,
-    #[command(flatten)]
-    ask: AskArgs,
-}
-
-/// What is agreed to in so many words: what nothing corrects does not move unasked.
-#[derive(Clone, Copy, Debug, Args)]
-struct AgreedArgs {
-    /// Go by the encoders alone: where nothing is calibrated, or without what is.
-    #[arg(long)]
-    uncompensated: bool,
-    /// Go beyond the calibrated range of a linear axis, where its deviation was never measured.
-    #[arg(long)]
-    beyond: bool,
-}
-
-impl AgreedArgs {
-    const fn agreed(self) -> Agreed {
-        Agreed {
-            uncompensated: self.uncompensated,
-            beyond: self.beyond,
-        }
-    }
-}
-
-impl MoveArgs {
-    /// `truestage move x=12.5mm` means `./machine.toml`, as with every verb.
-    fn settle(mut self) -> Self {
-        let first = self.machine.config.to_string_lossy();
-        if first.contains('=') && !self.machine.config.exists() {
-            self.targets.insert(0, first.into_owned());
-            self.machine.config = "machine.toml".into();
-        }
-        self
-    }
-
-    /// The axes that it names.
-    fn named(&self) -> impl Iterator<Item = &str> {
-        let targets = self.targets.iter();
-        targets.filter_map(|it| Some(it.split_once('=')?.0))
-    }
-
-    /// # Errors
-    /// When it agrees to go beyond a calibration that has no end, or cannot be left.
-    fn without_beyond(&self) -> Result<(), crate::Failure> {
-        only_for("--beyond", "linear axes", self.agreed.beyond)
-    }
-
-    /// # Errors
-    /// When it says which way round what does not turn.
-    fn without_way(&self) -> Result<(), crate::Failure> {
-        only_for("--way", "rotary axes", self.way.is_some())
-    }
-
-    /// # Errors
-    /// When it shall align what no camera sees.
-    fn without_align(&self) -> Result<(), crate::Failure> {
-        only_for("--align", "platforms, which a camera sees", self.align)
-    }
-}
-
-/// Refuses `option`, when it `is_given`, for a machine of another kind.
-fn only_for(option: &str, kind: &str, is_given: bool) -> Result<(), crate::Failure> {
-    match is_given {
-        false => Ok(()),
-        true => Err(crate::Failure::Usage {
-            what: format!("{option} is for {kind}"),
-            help: "leave it out".into(),
-        }),
-    }
-}
-
 pub use serve::Serving;
 use token::NewToken;
 
 /// A service that keeps a machine.
 #[derive(Clone, Debug, Args)]
 struct ServiceArgs {
-    /// Where it is found: what `truestage serve --listen` said.
-    #[arg(long, value_name = "PLACE", default_value = "unix:truestage.sock")]
-    at: String,
+    /// The machine that it keeps, whose records say where it is found; `machine.toml` when it is there.
+    #[arg(value_name = "MACHINE.toml", conflicts_with = "at")]
+    config: Option<PathBuf>,
+    /// Where it is found: what `truestage serve --listen` said. `unix:truestage.sock` when nothing else is known.
+    #[arg(long, value_name = "PLACE")]
+    at: Option<String>,
 }
 
 /// Runs the command line of this process; `keep` keeps a machine for `truestage serve`, `enrol` makes a token for

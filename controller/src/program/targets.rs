@@ -5,7 +5,7 @@ use units::Metres;
 use units::text::length;
 
 use crate::Failure;
-use crate::program::MoveArgs;
+use crate::program::{ApproachName, MoveArgs};
 
 /// The targets of a move of linear axes.
 pub(crate) fn axis_targets(args: &MoveArgs) -> Result<Vec<(String, Metres)>, Failure> {
@@ -50,8 +50,12 @@ pub(crate) fn axis_motion(args: &MoveArgs) -> Result<AskedMotion, Failure> {
         .into_iter()
         .map(|(axis, it)| (axis, json!({"value": it.mm(), "unit": "mm"})));
     let targets: Map<String, Value> = targets.collect();
+    let side = args.approach.map(|it| match it {
+        ApproachName::Forward => "forward",
+        ApproachName::Reverse => "reverse",
+    });
     Ok(AskedMotion {
-        request: json!({"targets": targets}),
+        request: json!({"targets": targets, "approach": side}),
         zeroed,
         notes: Vec::new(),
     })

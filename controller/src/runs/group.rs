@@ -13,6 +13,7 @@ use super::planned::Planned;
 use super::task::{Found, Task, Work};
 use super::teller::Teller;
 use super::together::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, Part};
+use crate::bus_plan;
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
@@ -157,7 +158,11 @@ impl Group {
     /// # Errors
     /// When it is not configured.
     pub fn planned(&self, machine: &mut Machine, task: &Task) -> Result<Planned, Failure> {
-        (self.runs.planned)(machine, &self.name, task)
+        let planned = (self.runs.planned)(machine, &self.name, task)?;
+        Ok(Planned {
+            bus_load: bus_plan::loads(machine.config()),
+            ..planned
+        })
     }
 
     /// Does what `task` says. `person` does what has to be done by hand, and `teller` says what came of it.

@@ -21,6 +21,7 @@ pub use group::{Group, Moved};
 pub use job::{AskedJob, JobJudge, JudgedJob};
 pub use path::{JudgedPath, PathJudge};
 pub use person::{Person, Question};
+pub(crate) use planned::standing;
 pub use planned::{Planned, Travel};
 pub use task::{Found, Task};
 pub use teller::{Teller, Told};

@@ -1,16 +1,19 @@
 //! What is run on three axes for whoever keeps a machine: all of them together, and a person sets lines up.
 
+use core::time::Duration;
 use std::path::Path;
 
 use machine::Stage;
 use machine::records::Store;
 use serde_json::json;
+use units::Metres;
 
 use crate::config::MachineConfig;
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::runs::{
-    DataFile, Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Work,
+    DataFile, Found, Group, GroupRuns, JudgedPath, Moved, Part, PathJudge, Planned, Task, Travel,
+    Work, standing,
 };
 use crate::volumetric::asked::Asking;
 use crate::volumetric::calibrate::minutes_of;
@@ -109,8 +112,22 @@ impl WorkVolume<'_> {
         let numbered = plan.lines.iter().enumerate();
         let set_up = numbered.filter(|(_, line)| !line.by_detectors);
         let asks = set_up.map(|(number, _)| set_up_task(&lines, number).text());
+        let points = plan.lines.iter().map(|line| line.points as u64).sum();
+        let own = self.config.calibrate.as_ref();
+        let settle_ms = own.map_or(0.0, |it| it.settle_ms);
+        let ways = plan.lines.iter().map(|it| apart(it.from_m, it.to_m));
+        let travel = Metres(ways.sum());
+        let axes = self.config.axes.iter();
+        let axes = axes.filter_map(|it| self.core.config.axis.get(it));
+        let speeds = axes.map(|it| it.motion.speed_mm_per_s * 1e-3);
+        // Its three axes at once take it along a diagonal.
+        let speed = speeds.map(|it| it * it).sum::<f64>().sqrt();
+        let moving = Duration::try_from_secs_f64(travel.value() / speed).unwrap_or_default();
+        let settle = Duration::try_from_secs_f64(settle_ms * 1e-3).unwrap_or_default();
         Ok(Planned {
-            points: plan.lines.iter().map(|line| line.points as u64).sum(),
+            points,
+            travel: Some(Travel::Length(travel)),
+            at_least: moving + standing(settle, points),
             asks: asks.collect(),
             ..Planned::default()
         })
@@ -124,6 +141,12 @@ impl WorkVolume<'_> {
             ..Planned::default()
         })
     }
+}
+
+/// From one place to the other, metres.
+fn apart(from: [f64; 3], to: [f64; 3]) -> f64 {
+    let ways = from.iter().zip(to).map(|(from, to)| to - from);
+    ways.map(|it| it * it).sum::<f64>().sqrt()
 }
 
 /// Whether what is stored can be used, and which errors that corrects.

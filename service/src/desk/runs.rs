@@ -16,7 +16,7 @@ pub(crate) enum Prepared {
     /// It was made before: the run that it became.
     Before(String),
     /// It is judged, on the disk under this name when it has a key, and may be ordered.
-    New(String, Order),
+    New(String, Box<Order>),
 }
 
 /// Runs.
@@ -35,7 +35,7 @@ impl Desk {
         match self.prepare_run(caller, request, key)? {
             Prepared::Before(id) => Ok(id),
             Prepared::New(id, order) => {
-                let planned = self.done(caller, order);
+                let planned = self.done(caller, *order);
                 self.settle_run(id, key, planned)
             }
         }
@@ -55,7 +55,7 @@ impl Desk {
         match self.judge_run(request) {
             Ok(judged) => {
                 let order = Self::plan_order(&id, request, judged);
-                Ok(Prepared::New(id, order))
+                Ok(Prepared::New(id, Box::new(order)))
             }
             Err(problem) => self.settle_run(id, key, Err(problem)).map(Prepared::Before),
         }

@@ -20,15 +20,16 @@ use super::places::{Heard, Keeps};
 use super::state::{Closing, STREAMS, State as Shared};
 use crate::desk::Desk;
 use crate::problem::{Code, Problem, ProblemBody};
+use crate::view::Event;
 
-/// How often a stream looks.
+/// How often a stream looks, unless it samples more often.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
 /// A stream in which nothing happens says that it is alive so often: whoever hears nothing for longer has lost it.
 const ALIVE_EVERY: Duration = Duration::from_secs(3);
 
 /// Between two samples of every axis.
-const SAMPLE_MS: core::ops::RangeInclusive<u64> = 5..=60_000;
+const SAMPLE_MS: core::ops::RangeInclusive<u64> = 1..=60_000;
 
 /// What of it is sent.
 #[derive(Debug, Default, Deserialize, IntoParams)]
@@ -39,8 +40,9 @@ pub(super) struct Wanted {
     kinds: Option<String>,
     /// After the event of this number; the header `Last-Event-ID` says the same.
     after: Option<u64>,
-    /// Also a sample of every axis each so many milliseconds, at least 5, as events `sample` without an id.
-    #[param(minimum = 5, maximum = 60000)]
+    /// Also a sample of every axis each so many milliseconds, as events `sample` without an id; at most one each tick of
+    /// the machine, which is its SYNC.
+    #[param(minimum = 1, maximum = 60000)]
     sample_ms: Option<u64>,
 }
 
@@ -49,16 +51,48 @@ struct Following {
     kinds: Option<BTreeSet<String>>,
     newest: u64,
     waiting: VecDeque<Sent>,
-    sample: Option<(Duration, Instant)>,
+    sample: Option<Sampling>,
     closing: Closing,
     _stream: OwnedSemaphorePermit,
     /// Its connection keeps its place among the others.
     _heard: Option<Heard>,
 }
 
+struct Sampling {
+    every: Duration,
+    due: Instant,
+    /// When the last one was by the machine's clock: the same again says nothing.
+    last_s: f64,
+}
+
+impl Sampling {
+    fn each(every: Duration) -> Self {
+        Self {
+            every,
+            due: Instant::now(),
+            last_s: f64::NEG_INFINITY,
+        }
+    }
+
+    /// The axes, when it is time for them and the machine has ticked since.
+    fn take(&mut self, desk: &Desk) -> Option<Sent> {
+        let now = Instant::now();
+        let clock_s = desk.clock_s();
+        if now < self.due || clock_s <= self.last_s {
+            return None;
+        }
+        self.last_s = clock_s;
+        // Whoever was held up begins anew: no burst makes up for what was missed.
+        self.due = (self.due + self.every).max(now);
+        let axes = json!(desk.axes()).to_string();
+        Some(Sent::default().event("sample").data(axes))
+    }
+}
+
 /// Events as they happen.
 #[utoipa::path(
-    get, path = "/events", tag = "events", params(Wanted),
+    get, path = "/events", tag = "events",
+    params(Wanted, ("Last-Event-ID" = Option<u64>, Header, description = "After the event of this number, as a browser says it")),
     responses(
         (status = 200, description = "Server-Sent Events, each with its id; `data` is an Event", content_type = "text/event-stream", body = String),
         (status = 400, description = "Not understood", body = ProblemBody, content_type = "application/problem+json"),
@@ -87,14 +121,13 @@ pub(super) async fn events(
         Some(_) => 0,
     };
     let every = sampled(wanted.sample_ms)?;
+    let kinds = wanted.kinds.as_deref().map(kinds_of).transpose()?;
     let following = Following {
         desk: shared.desk,
-        kinds: wanted
-            .kinds
-            .map(|it| it.split(',').map(str::to_owned).collect()),
+        kinds,
         newest,
         waiting: VecDeque::new(),
-        sample: every.map(|it| (it, Instant::now())),
+        sample: every.map(Sampling::each),
         closing: shared.closing,
         _stream: place,
         _heard: keeps.map(|Extension(it)| it.heard()),
@@ -104,6 +137,22 @@ pub(super) async fn events(
         Some((Ok(sent), following))
     });
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(ALIVE_EVERY)))
+}
+
+/// The kinds with commas between, each of which there must be: a word that is misspelt would wait for ever.
+fn kinds_of(text: &str) -> Result<BTreeSet<String>, Problem> {
+    let kinds: BTreeSet<String> = text.split(',').map(|it| it.trim().to_owned()).collect();
+    match kinds.iter().find(|it| !Event::KINDS.contains(&it.as_str())) {
+        None => Ok(kinds),
+        Some(other) => Err(Problem::new(
+            Code::BadRequest,
+            format!("`kinds`: `{other}` is no kind of event"),
+            format!(
+                "give one or more of {}, with commas between",
+                Event::KINDS.join(", ")
+            ),
+        )),
+    }
 }
 
 /// How often the axes are told, when they are.
@@ -135,10 +184,15 @@ impl Following {
                 return None;
             }
             tokio::select! {
-                () = sleep(LOOK_EVERY) => {}
+                () = sleep(self.look_every()) => {}
                 () = self.closing.begun() => {}
             }
         }
+    }
+
+    fn look_every(&self) -> Duration {
+        let sampled = self.sample.as_ref().map(|it| it.every);
+        sampled.map_or(LOOK_EVERY, |it| it.min(LOOK_EVERY))
     }
 
     fn look(&mut self) {
@@ -162,13 +216,8 @@ impl Following {
                 self.waiting.push_back(sent.data(json!(event).to_string()));
             }
         }
-        if let Some((every, due)) = &mut self.sample
-            && *due <= Instant::now()
-        {
-            *due = Instant::now() + *every;
-            let axes = json!(self.desk.axes()).to_string();
-            self.waiting
-                .push_back(Sent::default().event("sample").data(axes));
-        }
+        let sample = self.sample.as_mut();
+        self.waiting
+            .extend(sample.and_then(|it| it.take(&self.desk)));
     }
 }

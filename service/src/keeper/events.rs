@@ -26,7 +26,9 @@ impl Events {
         self.now = now;
     }
 
+    /// `kind` is one of [`Event::KINDS`].
     pub(super) fn push(&mut self, kind: &str, of: &str, data: Value) {
+        debug_assert!(Event::KINDS.contains(&kind), "{kind}");
         self.newest += 1;
         self.kept.push_back(Arc::new(Event {
             id: self.newest,

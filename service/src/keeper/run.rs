@@ -66,7 +66,11 @@ impl Keeper {
             // What cannot be verified is refused before anything is measured.
             self.plan_of(RunKind::Verify, None, at)?;
         }
-        let plan = judged.as_ref().map_or(plan, plan_along);
+        let along = judged.as_ref().map(plan_along);
+        let plan = RunPlanView {
+            bus_load: plan.bus_load.clone(),
+            ..along.unwrap_or(plan)
+        };
         self.runs.make_room_for(judged.as_ref())?;
         let grouped = &self.groups[at];
         let (group, axes) = (Arc::clone(&grouped.group), grouped.axes.clone());
@@ -146,11 +150,13 @@ impl Keeper {
 
     /// The run `id` goes on with `journal`: no other one does.
     fn give_up_others(&mut self, id: &str, journal: &str) {
-        for paused in self.runs.give_up_others(id, journal) {
+        for other in self.runs.give_up_others(id, journal) {
             let stopped = stopped_by(format!("run {id}, which goes on with its journal"));
-            self.change_run(&paused, |view| {
-                view.state = RunState::Stopped;
-                view.stopped = Some(stopped);
+            self.change_run(&other, |view| {
+                if view.state == RunState::Paused {
+                    view.state = RunState::Stopped;
+                    view.stopped = Some(stopped);
+                }
             });
         }
     }

@@ -143,6 +143,7 @@ pub(super) fn shown(planned: Planned) -> RunPlanView {
         }),
         seconds_at_least: planned.at_least.as_secs_f64(),
         asks: planned.asks,
+        bus_load: planned.bus_load,
         join: None,
         departure: None,
     }

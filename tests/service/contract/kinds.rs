@@ -223,7 +223,8 @@ fn three_axes_become_warm_between_their_lines_where_that_is_asked_for() {
         };
         let (cold, warm) = (planned(None), planned(Some(2.5)));
         assert!(warm.asks.len() > cold.asks.len(), "{warm:?}");
-        assert_eq!(warm.seconds_at_least, cold.seconds_at_least + 150.0);
+        // Some of its lines are read once more.
+        assert!(warm.seconds_at_least > cold.seconds_at_least + 150.0);
         let refused = |kind, minutes| {
             let problem = bed.client.plan(&anna(), &request(kind, Some(minutes)));
             let problem = problem.unwrap_err();

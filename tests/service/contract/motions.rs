@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use mock_bus::fault::Fault;
-use service::{AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest, StopMode};
+use service::{
+    ApproachName, AxisState, Code, IfMoving, MachineState, MotionState, MoveRequest, StopMode,
+};
 use tests::{Edit, LINEAR, Rig, Shipped};
 use units::MetresPerSecond;
 
@@ -437,4 +439,58 @@ fn a_slow_motion_has_the_time_that_its_way_takes_and_one_without_an_end_is_refus
             assert!(refused.to_string().contains("24 h"), "{refused}");
         }),
     );
+}
+
+/// Lost motion is taken up from the side that is asked for, wherever the axis comes from.
+#[test]
+fn an_axis_arrives_from_the_side_that_is_asked_for() {
+    with_zeroed_stage(|bed| {
+        let arrived = |from_mm: f64, approach| {
+            bed.done(&to("x", from_mm));
+            bed.done(&MoveRequest {
+                approach: Some(approach),
+                ..to("x", 10.0)
+            });
+            // The same again is done at once: that is how it came there.
+            let before = bed.client.machine().newest_event;
+            bed.done(&MoveRequest {
+                approach: Some(approach),
+                ..to("x", 10.0)
+            });
+            let events = bed.client.events(before);
+            let of_motion: Vec<_> = events.iter().filter(|it| it.kind == "motion").collect();
+            let [queued, done] = of_motion[..] else {
+                panic!("{of_motion:?}")
+            };
+            let took_s = done.clock_s - queued.clock_s;
+            assert!(took_s <= 0.05, "{took_s} s");
+            bed.stage.true_mm()
+        };
+        for (side, other) in [(5.0, 15.0), (15.0, 5.0)] {
+            let forward = [
+                arrived(side, ApproachName::Forward),
+                arrived(other, ApproachName::Forward),
+            ];
+            let reverse = [
+                arrived(side, ApproachName::Reverse),
+                arrived(other, ApproachName::Reverse),
+            ];
+            let lost = (forward[0] - reverse[0]).abs();
+            assert!(lost > 3e-4, "it has lost motion: {lost} mm");
+            for [first, second] in [forward, reverse] {
+                assert!(
+                    (first - second).abs() < lost / 4.0,
+                    "{forward:?} {reverse:?}"
+                );
+            }
+        }
+        let refused = bed.refused(
+            &MoveRequest {
+                approach: Some(ApproachName::Forward),
+                ..to("x", -2.99)
+            },
+            Code::SoftLimit,
+        );
+        assert!(refused.detail().contains("soft limits"), "{refused}");
+    });
 }

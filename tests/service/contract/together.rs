@@ -58,7 +58,7 @@ fn at(view: &MotionView, name: &str) -> f64 {
 }
 
 impl Bed<'_> {
-    fn done(&self, request: &MoveRequest) -> MotionView {
+    pub(super) fn done(&self, request: &MoveRequest) -> MotionView {
         let view = self.ended(&self.begin(request));
         assert_eq!(view.state, MotionState::Done, "{view:?}");
         view

@@ -90,6 +90,7 @@ fn planned(job: &Job, plan: &JobPlan, speed: MetresPerSecond) -> Planned {
         travel: Some(Travel::Length(travel)),
         at_least: moves + stands.saturating_mul(job.repetitions),
         asks,
+        ..Planned::default()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use machine::Stage;
 use machine::records::Store;
-use units::{Metres, Several, Short, ShortSpan};
+use units::{Approach, Metres, Several, Short, ShortSpan};
 
 use crate::Failure;
 use crate::config::{AxisConfig, Loaded};
@@ -54,7 +54,8 @@ pub(crate) fn intended(
                     false => stored_corrected(loaded, store, (&axis, target))?,
                 };
                 corrected.require(&axis, target, args.agreed.agreed())?;
-                steps.push(moved(&axis, of_axis, (target, corrected)));
+                let way = (target, args.approach.map(Approach::from));
+                steps.push(moved(&axis, of_axis, (way, corrected)));
             }
             Ok(steps)
         }
@@ -71,9 +72,18 @@ fn stored_corrected(
     Ok(course.map_or(Corrected::No, |(_, course)| course.corrected(target)))
 }
 
-fn moved(axis: &str, of_axis: &AxisConfig, (target, corrected): (Metres, Corrected)) -> Step {
+fn moved(
+    axis: &str,
+    of_axis: &AxisConfig,
+    ((target, approach), corrected): ((Metres, Option<Approach>), Corrected),
+) -> Step {
+    let arrives = match approach {
+        None => "",
+        Some(Approach::Forward) => ", arriving forward",
+        Some(Approach::Reverse) => ", arriving in reverse",
+    };
     let text = format!(
-        "to {} mm, at {} mm/s{}",
+        "to {} mm{arrives}, at {} mm/s{}",
         Short(target.mm()),
         Short(of_axis.motion.speed_mm_per_s),
         warning(corrected)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use machine::records::Store;
 use serde_json::{Value, json};
-use units::Metres;
+use units::{Approach, Metres};
 
 use crate::linear::settings::require_within;
 use crate::linear::{Verified, VerifyOptions};
@@ -173,6 +173,7 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
     let targets = axis_targets(args)?;
     let mut session = Session::open(&args.machine, "move", Use::Motion, output)?;
     let agreed = args.agreed.agreed();
+    let approach = args.approach.map(Approach::from);
     for (axis, target) in &targets {
         require_within(session.machine.config(), axis, *target)?;
     }
@@ -186,7 +187,8 @@ pub(crate) fn move_to(args: &MoveArgs, output: Output) -> Ended {
         let mut moved = Vec::new();
         for ((axis, target), calibration) in targets.iter().zip(calibrations) {
             machine.linear(axis)?.zero(&store)?;
-            let one = machine.linear(axis)?.move_and_read(*target)?;
+            let mut stage = machine.linear(axis)?;
+            let one = stage.move_and_read_from(*target, approach)?;
             moved.push((axis, one, calibration));
         }
         machine.shut_down()?;

@@ -50,7 +50,7 @@ impl MonitorArgs {
 }
 
 pub(crate) fn run(args: &MonitorArgs, output: Output) -> Ended {
-    let at = &args.service.at;
+    let at = &args.service.place()?;
     // Who is not there is told at once, before a picture takes the terminal.
     let machine = ask(at, "GET", "/v1/machine", "")?;
     let newest = machine["newest_event"].as_u64().unwrap_or_default();

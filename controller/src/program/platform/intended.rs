@@ -30,6 +30,7 @@ pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
         }
         Intent::Move(args) => {
             args.without_way()?;
+            args.without_approach()?;
             args.without_beyond()
         }
     }

@@ -18,6 +18,7 @@ pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
         Intent::Zero(_) | Intent::Verify(_) | Intent::Calibrate(_) => Ok(()),
         Intent::Move(args) => {
             args.without_beyond()?;
+            args.without_approach()?;
             args.without_align()
         }
     }

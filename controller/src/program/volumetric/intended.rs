@@ -25,6 +25,7 @@ pub(crate) fn refuse(intent: Intent<'_>) -> Result<(), Failure> {
         Intent::Verify(args) => read_anew(args),
         Intent::Move(args) => {
             args.without_way()?;
+            args.without_approach()?;
             args.without_beyond()?;
             args.without_align()
         }

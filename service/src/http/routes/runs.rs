@@ -58,7 +58,7 @@ pub(super) async fn plan(
     let (status, id) = match prepared {
         Prepared::Before(id) => (StatusCode::OK, id),
         Prepared::New(id, order) => {
-            let planned = obey(&state.desk, &caller, order).await.map(|_| ());
+            let planned = obey(&state.desk, &caller, *order).await.map(|_| ());
             let id = state.desk.settle_run(id, key.as_deref(), planned)?;
             (StatusCode::CREATED, id)
         }

@@ -6,7 +6,7 @@ use machine::Machine;
 use serde_json::json;
 use truestage::Agreed;
 use truestage::rotary::Way;
-use units::{AxisSpeed, Time};
+use units::{Approach, AxisSpeed, Time};
 
 use super::super::seat::Task;
 use super::super::stop::stopped_by;
@@ -92,6 +92,7 @@ impl Keeper {
                 },
                 speed: speed_of(request)?,
                 way: request.way.map(Way::from),
+                approach: request.approach.map(Approach::from),
             },
             dead_man: dead_man.map(|it| (it, now + it)),
             jog: None,
@@ -118,13 +119,16 @@ impl Keeper {
             leg.going = Some(going);
             Ok::<_, Problem>(())
         })?;
-        match wanted.way {
-            Some(_) if !motion.legs.iter().any(is_round) => {
-                let what = "`way` is for axes that turn, and this motion has none";
-                Err(Problem::new(Code::NotOffered, what, "leave it out"))
-            }
-            Some(_) | None => Ok(()),
+        let rounds = motion.legs.iter().filter(|it| is_round(it)).count();
+        let not_offered = |what| Err(Problem::new(Code::NotOffered, what, "leave it out"));
+        if wanted.way.is_some() && rounds == 0 {
+            return not_offered("`way` is for axes that turn, and this motion has none");
         }
+        if wanted.approach.is_some() && rounds > 0 {
+            let what = "`approach` is for axes that go along a way, and this motion turns one: `way` says from where it arrives";
+            return not_offered(what);
+        }
+        Ok(())
     }
 
     /// Makes the axes of a new motion free, lets it wait, or refuses it.

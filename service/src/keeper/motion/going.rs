@@ -3,17 +3,18 @@
 use core::time::Duration;
 
 use machine::{Driving, Failure, Machine, Moving};
+use truestage::Agreed;
 use truestage::linear::{Corrected, PlannedMove};
 use truestage::rotary::{PlannedTurn, Way};
 use truestage::runs::Moved;
-use truestage::{Agreed, linear};
-use units::{AxisSpeed, Metres, Radians};
+use units::{Approach, AxisSpeed, Metres, Radians};
 
 use super::super::mechanics::{Linear, Mechanics};
 use super::super::seat::Seat;
 use super::speed;
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
+use crate::quantity::Quantity;
 
 /// So long may an axis be on its way, in hours.
 const LONGEST_H: u64 = 24;
@@ -31,6 +32,7 @@ pub(super) struct Wanted {
     pub(super) agreed: Agreed,
     pub(super) speed: Option<AxisSpeed>,
     pub(super) way: Option<Way>,
+    pub(super) approach: Option<Approach>,
 }
 
 impl Going {
@@ -79,6 +81,14 @@ impl Going {
         match self {
             Self::Along(it) => it.set_point.into(),
             Self::Round(it) => it.set_point.into(),
+        }
+    }
+
+    /// How fast it goes.
+    pub(super) fn speed(&self) -> Quantity {
+        match self {
+            Self::Along(it) => Quantity::mm_per_s(it.speed),
+            Self::Round(it) => Quantity::deg_per_s(it.speed),
         }
     }
 
@@ -175,7 +185,7 @@ fn along(
     (target, wanted): (Metres, Wanted),
 ) -> Result<PlannedMove, Problem> {
     let (axis, agreed) = (&seat.name, wanted.agreed);
-    let alone = linear::Course::default();
+    let alone = own.course.uncompensated();
     let course = match (seat.moved, agreed.uncompensated) {
         (Moved::Together, _) => {
             let what = format!("axis {axis} moves only together with others, and not by itself");
@@ -185,7 +195,10 @@ fn along(
         (Moved::CorrectedTogether | Moved::Alone, true) => &alone,
         (Moved::CorrectedTogether | Moved::Alone, false) => &own.course,
     };
-    let mut planned = course.plan(machine, axis, target)?;
+    let mut planned = match wanted.approach {
+        None => course.plan(machine, axis, target)?,
+        Some(approach) => course.plan_from(machine, axis, target, approach)?,
+    };
     planned.corrected.require(axis, target, agreed)?;
     if let Some(wanted) = wanted.speed {
         planned.speed = speed::along(axis, wanted)?.min(planned.speed);

@@ -19,6 +19,7 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         let view = LegView {
             target: leg.target.shown(),
             set_point: leg.going.map(|it| it.set_point().shown()),
+            speed: leg.going.map(|it| it.speed()),
             corrected: leg.corrected().word().to_owned(),
             position: None,
             encoder: None,

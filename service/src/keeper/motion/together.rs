@@ -102,6 +102,7 @@ impl Together {
         let blank = |target: Place| LegView {
             target: Coordinate::from(target).shown(),
             set_point: None,
+            speed: None,
             corrected: corrected.to_owned(),
             position: None,
             encoder: None,
@@ -318,6 +319,7 @@ fn refuse_options(request: &MoveRequest, group: &Group) -> Result<(), Problem> {
     let given = [
         ("speed", request.speed.is_some()),
         ("way", request.way.is_some()),
+        ("approach", request.approach.is_some()),
         ("beyond", request.beyond),
     ];
     let Some((option, _)) = given.into_iter().find(|it| it.1) else {

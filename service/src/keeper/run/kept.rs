@@ -215,20 +215,18 @@ impl Runs {
         Err(Problem::new(Code::Busy, what, "start them, or abort one"))
     }
 
-    /// The run `id` goes on with `journal`: the others that have left it do not. Those that were paused for that.
+    /// The run `id` goes on with `journal`: the others that have left it, which are returned, do not.
     pub(super) fn give_up_others(&mut self, id: &str, journal: &str) -> Vec<String> {
         let is_other = |it: &&mut Run| {
             *it.task.id != *id && it.view.journal.as_deref() == Some(journal) && it.can_go_on()
         };
-        let mut paused = Vec::new();
+        let mut others = Vec::new();
         for run in self.kept.iter_mut().filter(is_other) {
             run.changing().give_up();
-            if run.view.state == RunState::Paused {
-                paused.push(run.view.id.clone());
-            }
+            others.push(run.view.id.clone());
         }
         self.published = None;
-        paused
+        others
     }
 
     pub(in crate::keeper) fn find(&mut self, id: &str) -> Result<&mut Run, Problem> {
