@@ -41,19 +41,17 @@ impl DerefMut for Machine {
 /// Where it is noted of each axis that it has its zero, beside the records.
 const ZEROS: &str = "zeros";
 
-/// A hash of all that the configuration says: not only what a calibration depends on says what a count means.
-fn in_full(loaded: &Loaded) -> String {
-    let text = format!("{:?}", loaded.config);
-    ConfigHash::of_texts(&text, &[]).as_str().to_owned()
-}
-
 impl Machine {
     /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
     /// Nothing is sent yet.
     pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
         let mut core = machine::Machine::new(assemble::parts(loaded), transport);
         let store = loaded.config.machine.store();
-        kept_zero::keep(&mut core, store.root().join(ZEROS), in_full(loaded));
+        kept_zero::keep(
+            &mut core,
+            store.root().join(ZEROS),
+            loaded.text.as_str().to_owned(),
+        );
         Self {
             core,
             config: loaded.config.clone(),

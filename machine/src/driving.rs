@@ -57,7 +57,8 @@ impl<'m> Driving<'m> {
 
     /// Begins to switch the axis off.
     pub fn disable(&mut self) {
-        self.control(DriveCommand::Disable);
+        // Whoever pushes it meanwhile takes up what lost motion there is.
+        self.give_up(DriveCommand::Disable);
     }
 
     /// How what was begun last ended; `None` while it runs, and when it has been asked for.

@@ -153,7 +153,8 @@ pub enum Failure {
     },
     /// What was noted of an earlier zero would be believed at the next start.
     #[error(
-        "{}: cannot be removed: {source}; it tells of a zero that the axis loses now, and nothing was moved", path.display()
+        "{}: cannot be removed: {source}; it tells of a zero that the axis loses now: remove it, or the next start believes it",
+        path.display()
     )]
     ZeroNoted {
         /// Which file.

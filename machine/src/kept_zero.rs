@@ -4,10 +4,11 @@
 //! note goes. A start compares the two ([`drivers::device::ReferenceProof`]), and an axis without a note, or with one
 //! that does not fit, has no zero. The order makes any moment safe to die in: the note is never older than the zero.
 
+use core::time::Duration;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use drivers::device::{DriveCommand, DriveReference};
+use drivers::device::{DriveCommand, ReferenceLost, ServoDrive};
 
 use crate::failure::Failure;
 use crate::machine::Machine;
@@ -69,23 +70,50 @@ fn read(
     machine: &mut Machine,
     at: usize,
     mark: Option<u32>,
-) -> Result<Result<DriveReference, String>, Failure> {
+) -> Result<Result<(), String>, Failure> {
     let command = DriveCommand::ReadReference { mark };
     match machine.control(at, command, "reading its reference", STOP_LIMIT) {
-        Ok(()) => {}
+        Ok(()) => Ok(Ok(())),
         Err(refused @ (Failure::Device { .. } | Failure::Overdue { .. })) => {
-            return Ok(Err(refused.to_string()));
+            Ok(Err(refused.to_string()))
         }
-        Err(failure) => return Err(failure),
+        Err(failure) => Err(failure),
     }
-    let shown = machine.devices.drive(at).reference();
-    Ok(shown.ok_or_else(|| "the drive showed nothing".to_owned()))
+}
+
+/// An axis that is homed on its way stops somewhere behind: it is read again, so many times and so long after.
+const READINGS: u32 = 40;
+const SETTLING: Duration = Duration::from_millis(50);
+
+/// `read` until the axis stood meanwhile; what `judge` says of that then.
+fn read_at_rest<R>(
+    machine: &mut Machine,
+    at: usize,
+    mark: Option<u32>,
+    judge: impl Fn(&mut dyn ServoDrive) -> Result<R, ReferenceLost>,
+) -> Result<Result<Result<R, ReferenceLost>, String>, Failure> {
+    let mut readings = READINGS;
+    loop {
+        if let Err(why) = read(machine, at, mark)? {
+            return Ok(Err(why));
+        }
+        readings -= 1;
+        match judge(machine.devices.drive_mut(at)) {
+            Err(ReferenceLost::Moving { .. }) if readings > 0 => {
+                let until = machine.now() + SETTLING;
+                machine.run_until(until)?;
+            }
+            judged => return Ok(Ok(judged)),
+        }
+    }
 }
 
 fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>, Failure> {
     let axis = machine.devices.name(at);
-    let shown = match read(machine, at, Some(unlike_any_other(&axis)))? {
-        Ok(shown) => shown,
+    let mark = Some(unlike_any_other(&axis));
+    let shown = match read_at_rest(machine, at, mark, |drive| drive.reference())? {
+        Ok(Ok(shown)) => shown,
+        Ok(Err(why)) => return Ok(Err(why.to_string())),
         Err(why) => return Ok(Err(why)),
     };
     let Some(kept) = &machine.kept_zeros else {
@@ -99,6 +127,7 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
         homed: shown.homed,
         homing_method: shown.method,
         home_offset: shown.home_offset,
+        polarity: shown.polarity,
         position_counts: shown.position,
         encoder_increments: shown.increments,
         moved_increments: shown.moved,
@@ -108,13 +137,12 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
     Ok(kept.write(&note).map_err(|it| it.to_string()))
 }
 
-/// The axis has no zero any more, or is about to be moved somewhere else by a search for it.
+/// The axis has no zero any more, or is about to be moved somewhere else by a search for it. Also of a drive that proves
+/// nothing by this configuration: another one of the same machine may ask it to.
 pub(crate) fn forget(machine: &Machine, at: usize) -> Result<(), Failure> {
     match &machine.kept_zeros {
-        Some(kept) if machine.devices.drive(at).proves_reference() => {
-            kept.forget(&machine.devices.name(at))
-        }
-        _ => Ok(()),
+        Some(kept) => kept.forget(&machine.devices.name(at)),
+        None => Ok(()),
     }
 }
 
@@ -131,32 +159,49 @@ pub(crate) fn take_up(machine: &mut Machine) -> Result<(), Failure> {
         let Some(note) = machine.kept_zeros.as_ref().and_then(|it| it.read(&axis)) else {
             continue;
         };
-        match still_holds(machine, at, &note)? {
-            Ok(()) => machine.zeroed[at] = true,
-            Err(why) => machine.notices.warn(format!(
-                "axis {axis}: it must be zeroed again, its zero was not kept: {why}"
-            )),
-        }
+        let lost = match still_holds(machine, at, &note)? {
+            Holds::Yes => {
+                machine.zeroed[at] = true;
+                continue;
+            }
+            Holds::Unread(why) => why,
+            Holds::No(why) => {
+                give_up(machine, at)?;
+                why
+            }
+        };
+        machine.notices.warn(format!(
+            "axis {axis}: it must be zeroed again, its zero was not kept: {lost}"
+        ));
     }
     Ok(())
 }
 
-fn still_holds(
-    machine: &mut Machine,
-    at: usize,
-    note: &Note,
-) -> Result<Result<(), String>, Failure> {
+/// What was found wrong once is not believed when it looks right later: a fault that was reset leaves no trace.
+fn give_up(machine: &mut Machine, at: usize) -> Result<(), Failure> {
+    forget(machine, at)?;
+    // A note of the same mark may lie elsewhere; a drive that does not take it has said so by being read.
+    read(machine, at, Some(0)).map(drop)
+}
+
+enum Holds {
+    Yes,
+    /// It could not be asked.
+    Unread(String),
+    No(String),
+}
+
+fn still_holds(machine: &mut Machine, at: usize, note: &Note) -> Result<Holds, Failure> {
     if let Some(other) = is_of_another(machine, at, note) {
-        return Ok(Err(other.into()));
+        return Ok(Holds::No(other.into()));
     }
-    if let Err(why) = read(machine, at, None)? {
-        return Ok(Err(why));
-    }
-    let taken_up = machine
-        .devices
-        .drive_mut(at)
-        .take_up_reference(&note.reference());
-    Ok(taken_up.map_err(|it| it.to_string()))
+    let then = note.reference();
+    let judged = read_at_rest(machine, at, None, |drive| drive.take_up_reference(&then))?;
+    Ok(match judged {
+        Ok(Ok(())) => Holds::Yes,
+        Ok(Err(why)) => Holds::No(why.to_string()),
+        Err(why) => Holds::Unread(why),
+    })
 }
 
 /// Why a note says nothing of this axis, whatever its drive shows.

@@ -193,11 +193,15 @@ impl Machine {
             }
             at += 1;
         });
-        for (at, alarm) in &raised {
-            if takes_reference(alarm) && *at < self.devices.drive_count() {
+        for (at, alarm) in raised.iter().filter(|it| it.0 < self.devices.drive_count()) {
+            if takes_reference(alarm) {
                 self.zeroed[*at] = false;
-                // The alarm stops the machine; a note that cannot be removed is found wrong at the next start.
-                let _ = kept_zero::forget(self, *at);
+            }
+            // The alarm is what stops the machine, and is told.
+            if !is_of_communication(alarm)
+                && let Err(failure) = kept_zero::forget(self, *at)
+            {
+                self.notices.warn(failure.to_string());
             }
         }
         // An instrument or a camera that nobody reads may have its beam blocked.
@@ -236,6 +240,20 @@ const fn takes_reference(alarm: &Alarm) -> bool {
         | Alarm::AmplifierRestarted { .. }
         | Alarm::PositionJump { .. } => true,
         Alarm::Emergency { emergency, .. } => emergency.code.0 & 0xFF00 == SENSOR,
+        _ => false,
+    }
+}
+
+/// That a drive was not heard says nothing of where its axis is. After anything else it is zeroed again, whatever it proves.
+const fn is_of_communication(alarm: &Alarm) -> bool {
+    /// The class of errors of communication (CiA 301, table 26).
+    const COMMUNICATION: u16 = 0x8100;
+    match alarm {
+        Alarm::HeartbeatLost { .. }
+        | Alarm::UnexpectedNmtState { .. }
+        | Alarm::PdoLost { .. }
+        | Alarm::PdoTooShort { .. } => true,
+        Alarm::Emergency { emergency, .. } => emergency.code.0 & 0xFF00 == COMMUNICATION,
         _ => false,
     }
 }

@@ -1,14 +1,15 @@
 //! What is noted of zeros: a file for each axis whose drive can prove that it kept its reference.
 
 use std::fs;
-use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use drivers::device::DriveReference;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
-use crate::records::{IdentityRecord, StoreError, opened, sealed, write_new_or_replace};
+use crate::records::{
+    IdentityRecord, StoreError, opened, remove_durably, sealed, write_new_or_replace,
+};
 
 /// Of the note. One of another version is none.
 pub(crate) const VERSION: u32 = 1;
@@ -32,6 +33,7 @@ pub(crate) struct Note {
     pub(crate) homed: Option<bool>,
     pub(crate) homing_method: u32,
     pub(crate) home_offset: u32,
+    pub(crate) polarity: u32,
     pub(crate) position_counts: i32,
     pub(crate) encoder_increments: Option<i32>,
     pub(crate) moved_increments: u32,
@@ -45,6 +47,7 @@ impl Note {
             homed: self.homed,
             method: self.homing_method,
             home_offset: self.home_offset,
+            polarity: self.polarity,
             position: self.position_counts,
             increments: self.encoder_increments,
             moved: self.moved_increments,
@@ -70,12 +73,7 @@ impl KeptZeros {
     /// When there is one and it cannot be removed: it would be believed at the next start.
     pub(crate) fn forget(&self, axis: &str) -> Result<(), Failure> {
         let path = self.path(axis);
-        match fs::remove_file(&path) {
-            Err(source) if source.kind() != ErrorKind::NotFound => {
-                Err(Failure::ZeroNoted { path, source })
-            }
-            _ => Ok(()),
-        }
+        remove_durably(&path).map_err(|source| Failure::ZeroNoted { path, source })
     }
 
     /// # Errors

@@ -188,6 +188,13 @@ fn a_service_that_comes_again_moves_without_a_zero_where_the_drive_proves_that_i
             (&json!(true), &json!("Disabled")),
             "{axis:#}"
         );
+        let off = bench.run(&["move", "machine.toml", "x=5mm", "--uncompensated"]);
+        let off = off.with_code(3);
+        check_error(&off, &["switched off", "truestage enable"]);
+        let on = bench
+            .run(&["enable", "machine.toml", "--axis", "x"])
+            .with_code(0);
+        assert_eq!(on["axes"][0]["state"], "Standstill", "{on}");
         let moved = bench.run(&["move", "machine.toml", "x=5mm", "--uncompensated"]);
         let moved = moved.with_code(0);
         let there = Watcher::of(&bench).true_mm();

@@ -30,6 +30,8 @@ pub struct Loaded {
     pub config: MachineConfig,
     /// Of everything in it that a calibration depends on.
     pub hash: ConfigHash,
+    /// Of the whole text: what a kept zero depends on.
+    pub(crate) text: ConfigHash,
     /// What is doubtful of it, in the order of the file.
     pub warnings: Vec<Diagnostic>,
     /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
@@ -96,6 +98,7 @@ fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, Con
     let ended = certificates::judged(&config, certificate::today(), &mut warnings);
     Ok(Loaded {
         hash: hash_of(&config),
+        text: ConfigHash::of_texts(text, &[]),
         warnings: placed(text, file, at_values(warnings)),
         ended: placed(text, file, at_values(ended)),
         unfilled: lines::unfilled(text, file),

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use units::{Metres, Short};
+
 use super::judge::{Finding, Judge};
 use super::model::MachineConfig;
 use super::watch_warnings;
@@ -14,6 +16,8 @@ pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
     let mut found = Vec::new();
     check_profiles(config, &mut found);
     check_paths(config, &mut found);
+    check_rates(config, &mut found);
+    check_dead_paths(config, &mut found);
     watch_warnings::check(config, &mut found);
     for kind in KINDS {
         (kind.warnings)(config, &mut found);
@@ -33,6 +37,49 @@ fn check_paths(config: &MachineConfig, found: &mut Vec<Finding>) {
             let cause = format!("{} is that of {other} too", path.display());
             let help = "give each the device that it is plugged into; `/dev/serial/by-id/` has their names";
             Judge::at(key, found).say("path", cause, help);
+        }
+    }
+}
+
+/// What converters of serial lines are made for, in bit/s; others take the nearest that they can, without a word.
+const USUAL_RATES: [u32; 24] = [
+    300, 600, 1200, 2400, 4800, 9600, 14_400, 19_200, 28_800, 38_400, 57_600, 76_800, 115_200,
+    128_000, 230_400, 250_000, 256_000, 460_800, 500_000, 576_000, 921_600, 1_000_000, 2_000_000,
+    3_000_000,
+];
+
+fn check_rates(config: &MachineConfig, found: &mut Vec<Finding>) {
+    for (name, line) in &config.serial {
+        let rate = line.baud_bit_per_s;
+        if !USUAL_RATES.contains(&rate) {
+            Judge::at(format!("serial.{name}"), found).say(
+                "baud_bit_per_s",
+                format!("{rate} bit/s is no usual rate, and nothing is understood at another one than the device has"),
+                "take what its manual says: 9600, 19200, 38400, 57600, 115200 and so on",
+            );
+        }
+    }
+}
+
+/// Longer than any machine is: beyond it a laser loses its fringes before the path is dead.
+const DEAD_PATH_MAX: Metres = Metres(10.0);
+
+fn check_dead_paths(config: &MachineConfig, found: &mut Vec<Finding>) {
+    for (name, instrument) in &config.instrument {
+        let Some(path) = instrument.corrections().dead_path.map(|it| it.length) else {
+            continue;
+        };
+        if path > DEAD_PATH_MAX {
+            Judge::at(format!("instrument.{name}"), found).say(
+                "dead_path_mm",
+                format!(
+                    "{} mm of dead path are {} m, and a part in a million of air over it {} µm",
+                    Short(path.mm()),
+                    Short(path.value()),
+                    Short(path.value())
+                ),
+                "give the way of the beam from the interferometer to the reflector at the zero, in millimetres",
+            );
         }
     }
 }
@@ -111,6 +158,16 @@ mod tests {
         ] {
             check(text, &[], &[], "");
         }
+    }
+
+    #[test]
+    fn a_rate_that_nobody_has_and_a_dead_path_that_no_machine_has_are_told() {
+        let edit = ("baud_bit_per_s = 115200", "baud_bit_per_s = 115201");
+        let says = "115201 bit/s is no usual rate";
+        check(LINEAR, &[edit], &["serial.laser.baud_bit_per_s"], says);
+        let edit = ("dead_path_mm = ", "dead_path_mm = 100000.0 # ");
+        let says = "are 100 m";
+        check(LINEAR, &[edit], &["instrument.laser.dead_path_mm"], says);
     }
 
     #[test]

@@ -18,6 +18,9 @@ const HANGS_MOVES: f64 = 20.0;
 /// A shorter time within the window is somebody's wish, however short the moves are.
 const STANDS_MAX_S: f64 = 1.0;
 
+/// Without its controller a drive goes on for so long at most, unless somebody wants it otherwise.
+const ALONE_MAX_MS: u16 = 2000;
+
 /// What is judged of any drive: in millimetres or degrees.
 struct Watched {
     /// The longest way, in words.
@@ -33,6 +36,8 @@ struct Watched {
     following_error_timeout_ms: Option<u16>,
     position_window_time_ms: u16,
     move_timeout_s: f64,
+    /// After so long without the controller's heartbeat it stops, on CAN.
+    watch_master_ms: Option<u16>,
 }
 
 impl Watched {
@@ -56,6 +61,7 @@ impl Watched {
             },
             position_window_time_ms: motion.position_window_time_ms,
             move_timeout_s: motion.move_timeout_s,
+            watch_master_ms: axis.node().map(|it| it.watch_master_ms),
         }
     }
 
@@ -74,6 +80,7 @@ impl Watched {
             following_error_timeout_ms: Some(table.following_error_timeout_ms),
             position_window_time_ms: table.position_window_time_ms,
             move_timeout_s: table.move_timeout_s,
+            watch_master_ms: Some(table.node.watch_master_ms),
         }
     }
 
@@ -83,6 +90,7 @@ impl Watched {
         self.standing(judge);
         self.hurried(judge);
         self.hanging(judge);
+        self.alone(judge);
     }
 
     fn quick_stop(&self, judge: &mut Judge<'_>) {
@@ -100,6 +108,22 @@ impl Watched {
             key,
             cause,
             "give at least what a move ends with: a quick stop must not take longer",
+        );
+    }
+
+    fn alone(&self, judge: &mut Judge<'_>) {
+        let Some(alone) = self.watch_master_ms.filter(|it| *it > ALONE_MAX_MS) else {
+            return;
+        };
+        let cause = format!(
+            "when its controller is gone, the drive notices it after {} and goes on at {} until then",
+            span(f64::from(alone) * 1e-3),
+            self.speed
+        );
+        judge.say(
+            "watch_master_ms",
+            cause,
+            "give some heartbeats of the controller (master_heartbeat_ms of its bus), 200 to 1000 ms",
         );
     }
 
@@ -219,6 +243,16 @@ mod tests {
         );
         let says = "for 10s before it is there";
         check(LINEAR, &[edit], &["axis.x.position_window_time_ms"], says);
+    }
+
+    #[test]
+    fn a_drive_that_would_go_on_without_its_controller_is_told() {
+        let says = "after 20s and goes on at 200 mm/s until then";
+        let edit = (
+            "watch_master_ms = 500\n\n[axis.x.identity]",
+            "watch_master_ms = 20000\n\n[axis.x.identity]",
+        );
+        check(LINEAR, &[edit], &["axis.x.watch_master_ms"], says);
     }
 
     #[test]

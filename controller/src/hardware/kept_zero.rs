@@ -14,14 +14,16 @@ use crate::config::judge::Judge;
 #[serde(deny_unknown_fields)]
 pub struct KeptZeroConfig {
     /// `"mark"`: a number is written into `object` at zeroing, which the drive loses with its power. `"homed_bit"`: bit
-    /// `bit` of `object` is 1 as long as the drive is homed. `"absolute_encoder"`: the drive keeps its origin without power;
-    /// its position (0x6064) must still lie beside that of its encoder (0x6063) as at the zero.
+    /// `bit` of `object` is 1 as long as the drive is homed. `"absolute_encoder"`: the encoder is absolute over the whole
+    /// travel and the drive keeps its origin without power; its position (0x6064) must still lie beside that of its encoder
+    /// in `object` as at the zero.
     pub by: KeptZeroName,
     /// For `"mark"` one of 32 bits that means nothing to the drive and is not stored, such as a variable for users; for
-    /// `"homed_bit"` such as a statusword with a bit of the manufacturer's.
+    /// `"homed_bit"` such as a statusword with a bit of the manufacturer's; for `"absolute_encoder"` the encoder's own
+    /// position, which no homing changes: 0x6063 of some drives.
     #[schemars(extend("x-range" = "index:sub-index, such as `\"0x2F00:01\"`"))]
-    pub object: Option<String>,
-    /// From 0, the lowest. Not bit 12 of the statusword, which says so in homing mode only.
+    pub object: String,
+    /// From 0, the lowest. Of the statusword only 8, 14 and 15 are the manufacturer's; bit 12 says so in homing mode only.
     #[schemars(range(min = 0, max = 31))]
     pub bit: Option<u8>,
 }
@@ -47,37 +49,29 @@ impl KeptZeroConfig {
     pub(crate) fn check(&self, judge: &mut Judge<'_>) {
         const OBJECT: &str = "kept_zero.object";
         const BIT: &str = "kept_zero.bit";
-        let wants_object = self.by != KeptZeroName::AbsoluteEncoder;
-        let help = "give index and sub-index as the drive's manual has them, such as \"0x2F00:01\"";
-        match (&self.object, wants_object) {
-            (None, true) => judge.say(OBJECT, "is missing", help),
-            (Some(_), false) => judge.say(
+        let seen = object(&self.object);
+        match seen {
+            None => judge.say(
                 OBJECT,
-                "says nothing about an absolute encoder",
-                "remove it",
+                format!("`{}` is no object", self.object),
+                "give index and sub-index as the drive's manual has them, such as \"0x2F00:01\"",
             ),
-            (Some(text), true) => match object(text) {
-                None => judge.say(OBJECT, format!("`{text}` is no object"), help),
-                Some(it) if self.by == KeptZeroName::Mark && !is_manufacturers(it) => judge.say(
-                    OBJECT,
-                    format!("{it} has a meaning of its own, and a mark would change it"),
-                    "give an object of the manufacturer's (0x2000 to 0x5FFF) that is free for users",
-                ),
-                Some(_) => {}
-            },
-            (None, false) => {}
+            Some(it) if self.by == KeptZeroName::Mark && !is_manufacturers(it) => judge.say(
+                OBJECT,
+                format!("{it} has a meaning of its own, and a mark would change it"),
+                "give an object of the manufacturer's (0x2000 to 0x5FFF) that is free for users",
+            ),
+            Some(_) => {}
         }
         match (self.bit, self.by == KeptZeroName::HomedBit) {
             (None, true) => judge.say(BIT, "is missing", "give the number of the bit, 0 to 31"),
             (Some(_), false) => judge.say(BIT, "is for `by = \"homed_bit\"` only", "remove it"),
-            (Some(bit @ 32..), true) => {
-                judge.say(BIT, format!("{bit} is no bit"), "give 0 to 31");
-            }
-            (Some(12), true) if self.object.as_deref().and_then(object) == Some(STATUSWORD) => {
+            (Some(bit @ 32..), true) => judge.say(BIT, format!("{bit} is no bit"), "give 0 to 31"),
+            (Some(bit), true) if seen == Some(STATUSWORD) && !OF_MANUFACTURER.contains(&bit) => {
                 judge.say(
                     BIT,
-                    "12 of the statusword means `homing attained` in homing mode only, and something else in others",
-                    "give the bit that the manufacturer has for it, or another proof",
+                    format!("{bit} of the statusword means something else in CiA 402, whatever the drive is homed by"),
+                    "give the bit that the manufacturer has for it (8, 14 or 15), or another proof",
                 );
             }
             _ => {}
@@ -86,19 +80,21 @@ impl KeptZeroConfig {
 
     /// What the driver is told; the configuration has been checked.
     pub(crate) fn proof(&self) -> ReferenceProof {
-        let object = || self.object.as_deref().and_then(object).expect(CHECKED);
+        let object = object(&self.object).expect(CHECKED);
         match self.by {
-            KeptZeroName::Mark => ReferenceProof::Mark(object()),
+            KeptZeroName::Mark => ReferenceProof::Mark(object),
             KeptZeroName::HomedBit => ReferenceProof::HomedBit {
-                object: object(),
+                object,
                 bit: self.bit.expect(CHECKED),
             },
-            KeptZeroName::AbsoluteEncoder => ReferenceProof::AbsoluteEncoder,
+            KeptZeroName::AbsoluteEncoder => ReferenceProof::AbsoluteEncoder(object),
         }
     }
 }
 
 const STATUSWORD: Object = Object::new(0x6041, 0);
+/// The bits of it that CiA 402 leaves to the manufacturer.
+const OF_MANUFACTURER: [u8; 3] = [8, 14, 15];
 
 fn is_manufacturers(object: Object) -> bool {
     (FIRST_OF_MANUFACTURER..FIRST_OF_PROFILES).contains(&object.index)

@@ -150,7 +150,11 @@ impl Course {
         let (from, set_point) =
             self.arrival_from((axis, approach), (target, length), Correction::On, &is_free)?;
         let tracker = machine.approach(axis)?;
-        let came_so = tracker.approach() == Some(approach) && was_sent_to(&tracker, set_point);
+        let window = machine.axis_settings(axis)?.position_window;
+        let reading = machine.reading(axis)?;
+        let is_there = reading.is_some_and(|it| (it.position - set_point).abs() <= window * 2.0);
+        let came_so =
+            tracker.approach() == Some(approach) && was_sent_to(&tracker, set_point) && is_there;
         let begins_there = was_sent_to(&tracker, from);
         Ok(PlannedMove {
             by_way_of: (!came_so && !begins_there).then_some(from),
@@ -378,16 +382,18 @@ fn corrected_at(table: &Compensation, target: Metres) -> Corrected {
     }
 }
 
-/// Whether that was the set-point of the last motion.
 fn no_length(axis: &str) -> Failure {
     Failure::Usage {
         what: format!(
             "axis {axis}: nothing says over which length it approaches a place; nothing was moved"
         ),
-        help: format!("give approach_mm in [axis.{axis}.compensation], or leave the approach out"),
+        help: format!(
+            "give approach_mm in [axis.{axis}.compensation], or overrun_mm of its calibrations, or leave the approach out"
+        ),
     }
 }
 
+/// Whether that was the set-point of the last motion.
 fn was_sent_to(tracker: &ApproachTracker, place: Metres) -> bool {
     let last = tracker.last();
     last.is_some_and(|it| (it - place).abs() <= ROUNDING)

@@ -14,11 +14,15 @@ const RUN_MAX_S: f64 = 8.0 * 3600.0;
 /// A target that is nearer to a calibrated position than this share of the step shows nothing between.
 const SAME_PLACE: f64 = 0.02;
 
+/// Of the acceleration of the drivers' homing.
+const HOMING_SHARE: f64 = 0.1;
+
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     for (name, axis) in &config.axis {
         let judge = &mut Judge::at(format!("axis.{name}"), found);
         check_window(judge, axis);
         check_stopping(judge, axis);
+        check_reference(judge, axis);
         for stage in [Stage::Calibrate, Stage::Verify] {
             check_duration(judge, axis, stage);
         }
@@ -55,6 +59,35 @@ fn check_window(judge: &mut Judge<'_>, axis: &AxisConfig) {
                 Short(tolerance)
             ),
             "give a fraction of the tolerance",
+        );
+    }
+}
+
+/// Behind a limit switch there is so much way to the end of a stage, seldom more.
+const BEHIND_SWITCH_MM: f64 = 3.0;
+
+fn check_reference(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    let Some(zero) = &axis.zero else {
+        return;
+    };
+    let speed = zero.reference_speed_mm_per_s;
+    // As its driver has it: a tenth of the hardest that it may do.
+    let hardest = motion
+        .acceleration_mm_per_s2
+        .max(motion.quick_stop_deceleration_mm_per_s2);
+    let way = speed * speed / (2.0 * HOMING_SHARE * hardest);
+    if way > BEHIND_SWITCH_MM {
+        judge.say(
+            "zero.reference_speed_mm_per_s",
+            format!(
+                "the axis reaches its limit switch at {} mm/s and stops {way:.1} mm behind it, where the stage may end",
+                Short(speed)
+            ),
+            format!(
+                "give {} mm/s or less",
+                Short((2.0 * HOMING_SHARE * hardest * BEHIND_SWITCH_MM).sqrt().floor())
+            ),
         );
     }
 }
@@ -168,6 +201,21 @@ mod tests {
         );
         let says = "3 µm beside its target, and accuracy_tolerance_um is 2";
         check(LINEAR, &[(from, "position_window_um = 3.0")], &[key], says);
+    }
+
+    #[test]
+    fn a_limit_switch_that_is_run_over_is_told() {
+        let edit = (
+            "reference_speed_mm_per_s = 20.0",
+            "reference_speed_mm_per_s = 500.0",
+        );
+        let says = "stops 62.5 mm behind it";
+        check(
+            LINEAR,
+            &[edit],
+            &["axis.x.zero.reference_speed_mm_per_s"],
+            says,
+        );
     }
 
     #[test]

@@ -90,6 +90,18 @@ fn check_references(
     for (at, actuator) in platform.actuator.iter().enumerate() {
         let judge = &mut Judge::at(format!("platform.actuator[{at}]"), findings);
         judge.known("axis", &actuator.axis, &config.axis, "axis");
+        if config
+            .axis
+            .get(&actuator.axis)
+            .is_some_and(|it| it.drive.keeps_zero())
+        {
+            let axis = &actuator.axis;
+            judge.say(
+                "axis",
+                format!("`{axis}` has a `kept_zero`, and the origin of a platform is what its camera saw"),
+                format!("remove axis.{axis}.kept_zero: a platform is zeroed after each start"),
+            );
+        }
         let [x, y] = actuator.direction;
         judge.within("direction", hypot(x, y), 1e-6, 1e6);
         if let Some(axis) = config.axis.get(&actuator.axis) {

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use machine::records::short;
 use serde_json::{Value, json};
 
-use crate::program::ServiceArgs;
+use crate::Failure;
 use crate::program::exchange::{ask, plain};
 use crate::program::output::{Ended, Output};
+use crate::program::{PowerArgs, ServiceArgs};
 
 /// What the machine and its axes are.
 pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
@@ -24,6 +25,42 @@ pub(crate) fn stop(args: &ServiceArgs, quick: bool, output: Output) -> Ended {
     let body = json!({"mode": mode}).to_string();
     let answer = ask(&args.place()?, "POST", "/v1/stop", &body)?;
     output.result(&format!("a {mode} stop is under way"), &answer)
+}
+
+/// Switches axes on or off: the one that is named, or all of them.
+pub(crate) fn power(args: &PowerArgs, on: bool, output: Output) -> Ended {
+    let at = args.service.place()?;
+    let axes = ask(&at, "GET", "/v1/axes", "")?;
+    let there: Vec<&str> = axes
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|it| it["name"].as_str())
+        .collect();
+    let names = match args.axis.as_deref() {
+        None => there,
+        Some(axis) if there.contains(&axis) => vec![axis],
+        Some(axis) => {
+            return Err(Failure::Usage {
+                what: format!("there is no axis `{axis}`"),
+                help: format!("this machine has {}", there.join(", ")),
+            });
+        }
+    };
+    let (verb, is) = if on {
+        ("enable", "on")
+    } else {
+        ("disable", "off")
+    };
+    let mut switched = Vec::new();
+    for name in &names {
+        switched.push(ask(&at, "POST", &format!("/v1/axes/{name}/{verb}"), "{}")?);
+    }
+    let lines: Vec<String> = names
+        .iter()
+        .map(|it| format!("axis {} is {is}", plain(it)))
+        .collect();
+    output.result(&lines.join("\n"), &json!({"axes": switched}))
 }
 
 fn text_of(machine: &Value, axes: &Value) -> String {
@@ -81,7 +118,7 @@ fn place_of(axis: &Value) -> String {
     ) {
         (true, Some(u)) => {
             let unit = unit("standard_uncertainty", "µm");
-            format!(" (corrected, u = {u:.3} {unit})")
+            format!(" (corrected, U = {:.3} {unit}, k = 2)", 2.0 * u)
         }
         (true, None) => " (corrected)".into(),
         (false, _) => " (by its encoder)".into(),
@@ -107,7 +144,7 @@ mod tests {
         assert_eq!(
             text,
             "machine linear (TS[31m): error_stop, x: fault\nlease: anna\naxis x: Standstill at 12.500000 mm \
-             (corrected, u = 0.123 µm), calibration 0123456789ab of 2026-03-01T08:00:00Z, in use by m1-2\n\
+             (corrected, U = 0.247 µm, k = 2), calibration 0123456789ab of 2026-03-01T08:00:00Z, in use by m1-2\n\
              axis y: Disabled at -1.000000 mm (by its encoder), NOT ZEROED"
         );
     }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::Failure;
+pub(crate) use crate::program::plain::plain;
 use crate::program::secure;
 
 /// The longest that an answer may take: a service answers within a tick.
@@ -211,13 +212,6 @@ fn header(
             help: format!("take the one that {giver} gave, or leave it out"),
         }),
     }
-}
-
-/// Nothing that a terminal would obey, but for the ends of lines.
-pub(crate) fn plain(text: &str) -> String {
-    text.chars()
-        .filter(|it| !it.is_control() || *it == '\n')
-        .collect()
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use machine::records::Lease;
+use machine::records::{Lease, Store};
+use toml::Table;
 
 use crate::Failure;
-use crate::config::{self, MachineConfig};
 use crate::program::ServiceArgs;
 use crate::program::exchange::plain;
 
@@ -18,30 +18,56 @@ impl ServiceArgs {
     /// Where to ask: as was said, or as the records of the machine say, or the usual place.
     ///
     /// # Errors
-    /// When the machine that was named has no sound configuration, or no service keeps it.
+    /// When no service keeps the machine that was named: who has it instead.
     pub(crate) fn place(&self) -> Result<String, Failure> {
         if let Some(at) = &self.at {
             return Ok(at.clone());
         }
         let Some(path) = &self.config else {
-            // A stop must not fail because of a configuration that nobody has named.
-            let here = config::load(Path::new(MACHINE)).ok();
-            let kept = here.and_then(|it| kept_at(&it.config));
-            return Ok(kept.unwrap_or_else(|| USUAL.into()));
+            let here = Kept::of(Path::new(MACHINE));
+            let place = here.and_then(|it| it.place);
+            return Ok(place.unwrap_or_else(|| USUAL.into()));
         };
-        let loaded = config::load(path)?;
-        kept_at(&loaded.config).ok_or_else(|| Failure::Usage {
+        let help = "start one with `truestage serve`, or say with --at where it is found";
+        let Some(kept) = Kept::of(path) else {
+            return Err(Failure::Usage {
+                what: format!("{}: not the configuration of a machine", path.display()),
+                help: help.into(),
+            });
+        };
+        kept.place.ok_or_else(|| Failure::Usage {
             what: format!(
-                "no service keeps machine {} ({})",
-                plain(&loaded.config.machine.name),
-                path.display()
+                "no service keeps machine {}{}",
+                plain(&kept.name),
+                kept.owner
+                    .map_or(String::new(), |it| format!("; {} has it", plain(&it)))
             ),
-            help: "start one with `truestage serve`, or say with --at where it is found".into(),
+            help: help.into(),
         })
     }
 }
 
-fn kept_at(config: &MachineConfig) -> Option<String> {
-    let (_, places) = Lease::owner(&config.machine.store())?;
-    places.into_iter().next()
+/// Who has a machine. A configuration that is wrong, because somebody edits it, says all the same whose it is: a stop must
+/// not fail by that.
+struct Kept {
+    name: String,
+    owner: Option<String>,
+    place: Option<String>,
+}
+
+impl Kept {
+    fn of(path: &Path) -> Option<Self> {
+        let text = std::fs::read_to_string(path).ok()?;
+        let document: Table = text.parse().ok()?;
+        let machine = document.get("machine")?.as_table()?;
+        let name = machine.get("name")?.as_str()?.to_owned();
+        let data_dir = machine.get("data_dir")?.as_str()?;
+        let data_dir = path.parent().unwrap_or(Path::new("")).join(data_dir);
+        let owner = Lease::owner(&Store::new(&data_dir, &name, &[]));
+        let (owner, places) = owner.map_or((None, Vec::new()), |(it, places)| (Some(it), places));
+        // What anybody on this computer may use, before what wants a token.
+        let is_local = |it: &&String| it.starts_with("unix:");
+        let place = places.iter().find(is_local).or(places.first()).cloned();
+        Some(Self { name, owner, place })
+    }
 }

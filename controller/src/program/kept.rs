@@ -138,8 +138,8 @@ impl Service {
         Ok(stop)
     }
 
-    /// A kept machine has its zero and is on, unless it was just started or reset, or somebody has switched it off: what a
-    /// verb does first where it has the machine itself.
+    /// A kept machine has its zero, unless it was just started or reset. What somebody has switched off stays off: whoever has
+    /// a reason for that need not be who moves it.
     fn zero_first(
         &self,
         axis: Option<&str>,
@@ -152,16 +152,10 @@ impl Service {
             |it: &&Value| axis.is_none_or(|axis| it["name"] == axis || it["group"] == axis);
         let meant: Vec<&Value> = axes.filter(is_meant).collect();
         if !meant.is_empty() && meant.iter().all(|it| it["homed"] == true) {
-            let off = meant.iter().filter(|it| it["state"] == "Disabled");
-            return off.copied().try_for_each(|it| self.enable(it));
+            return Ok(());
         }
         // What it says of an axis that is not there is said by the run.
         self.zero_run(axis, stop, output).map(drop)
-    }
-
-    fn enable(&self, axis: &Value) -> Result<(), Failure> {
-        let name = plain(axis["name"].as_str().unwrap_or_default());
-        ask(&self.at, "POST", &format!("/v1/axes/{name}/enable"), "{}").map(drop)
     }
 
     fn zero_run(

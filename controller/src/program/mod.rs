@@ -16,6 +16,7 @@ mod data_file;
 mod data_text;
 mod demo;
 mod doctor;
+mod examples;
 mod exchange;
 mod explain;
 mod found;
@@ -35,6 +36,7 @@ mod operator;
 mod output;
 mod page;
 mod paint;
+mod plain;
 mod platform;
 mod plausible;
 mod progress;
@@ -71,6 +73,7 @@ use wire::lockstep::path_of;
 
 use crate::ports::Pace;
 use crate::{Failure, made_by};
+use examples::{EXIT_CODES, with_examples};
 use intended::Intent;
 use move_args::{AgreedArgs, ApproachName, MoveArgs, WayName, only_for};
 use output::{Ended, Output, SaidArgs};
@@ -78,12 +81,6 @@ use refused::not_understood;
 use rotary::readings::ReadingsArgs;
 use schema::verb_of;
 use volumetric::memory_args::MemoryCommand;
-
-/// What a shell script learns of an end: [`crate::Failure::exit_code`].
-const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, \
-                          4 device or bus, 5 out of tolerance,\n130 stopped by Ctrl-C, 143 by \
-                          SIGTERM, 129 by SIGHUP";
-
 /// Makes precision motion stages go where they are told.
 #[derive(Debug, Parser)]
 #[command(name = "truestage", version, arg_required_else_help = true, after_help = EXIT_CODES)]
@@ -173,6 +170,10 @@ enum Command {
     Status(ServiceArgs),
     /// What it does as it happens: a picture on a terminal, elsewhere a line for each event.
     Monitor(monitor::MonitorArgs),
+    /// Switch on an axis of a machine that is kept by a service, or all of them.
+    Enable(PowerArgs),
+    /// Switch off an axis of a machine that is kept by a service, or all of them; they keep their zero.
+    Disable(PowerArgs),
     /// Stop everything that a service moves; taken from anybody.
     Stop {
         #[command(flatten)]
@@ -315,6 +316,16 @@ struct VerifyArgs {
 pub use serve::Serving;
 use token::NewToken;
 
+/// Which axes of a machine that is kept by a service.
+#[derive(Clone, Debug, Args)]
+struct PowerArgs {
+    #[command(flatten)]
+    service: ServiceArgs,
+    /// Which axis; all of them when not given.
+    #[arg(long)]
+    axis: Option<String>,
+}
+
 /// A service that keeps a machine.
 #[derive(Clone, Debug, Args)]
 struct ServiceArgs {
@@ -334,7 +345,9 @@ pub fn main(
     version: &'static str,
 ) -> ExitCode {
     made_by::this_is(version);
-    let words = Cli::command().version(version).try_get_matches();
+    let words = with_examples(Cli::command())
+        .version(version)
+        .try_get_matches();
     let read = words.and_then(|words| Ok((verb_of(&words), Cli::from_arg_matches(&words)?)));
     let (verb, cli) = match read {
         Ok(read) => read,
@@ -389,6 +402,8 @@ fn done(
         Command::Explain(args) => explain::run(&args, output),
         Command::Status(service) => ask::status(&service, output),
         Command::Monitor(args) => monitor::run(&args, output),
+        Command::Enable(args) => ask::power(&args, true, output),
+        Command::Disable(args) => ask::power(&args, false, output),
         Command::Stop { service, quick } => ask::stop(&service, quick, output),
         Command::Serve(args) => serve::run(args, output, keep),
         Command::Token(args) => token::run(args, output, enrol),
@@ -396,7 +411,7 @@ fn done(
         Command::Report(args) => report::run(&args, output),
         Command::Schema(command) => schema::run(command, &Cli::command(), output),
         Command::Completions(args) => shell::completions(args, Cli::command()),
-        Command::Man(args) => shell::man(&args, Cli::command(), output),
+        Command::Man(args) => shell::man(&args, with_examples(Cli::command()), output),
     }
 }
 

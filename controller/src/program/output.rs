@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::Failure;
 use crate::config::ConfigError;
 use crate::program::paint;
+use crate::program::plain::plain;
 use crate::program::progress::{self, Bars};
 use crate::runs::Told;
 
@@ -119,8 +120,8 @@ impl Output {
     fn print(self, text: &str, value: &Value) {
         let line = match self.json {
             true => self.object(value),
-            false if paint::is_wanted(&std::io::stdout()) => paint::painted(text),
-            false => text.to_owned(),
+            false if paint::is_wanted(&std::io::stdout()) => paint::painted(&plain(text)),
+            false => plain(text),
         };
         progress::settle();
         // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
@@ -159,12 +160,12 @@ impl Output {
     pub(crate) fn must_say(self, text: &str) {
         progress::settle();
         let is_painted = !self.json && paint::is_wanted(&std::io::stderr());
-        let painted = is_painted.then(|| paint::painted(text));
-        let _ = writeln!(
-            std::io::stderr().lock(),
-            "{}",
-            painted.as_deref().unwrap_or(text)
-        );
+        let text = plain(text);
+        let line = match is_painted {
+            true => paint::painted(&text),
+            false => text,
+        };
+        let _ = writeln!(std::io::stderr().lock(), "{line}");
     }
 
     /// Why the command line was refused, for programs.

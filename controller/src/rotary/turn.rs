@@ -62,6 +62,7 @@ impl RotaryTable<'_> {
             },
         };
         let limit = settings::index_limit(config).unwrap_or_default() + Duration::from_secs(5);
+        self.core.set_zeroed(self.axis, false)?;
         self.core.enable(self.axis)?;
         self.core
             .turning(self.axis)?

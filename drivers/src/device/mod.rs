@@ -108,8 +108,11 @@ pub trait ServoDrive: Device {
     }
 
     /// What the last [`DriveCommand::ReadReference`] has read.
-    fn reference(&self) -> Option<DriveReference> {
-        None
+    ///
+    /// # Errors
+    /// Why it would prove nothing at the next start.
+    fn reference(&self) -> Result<DriveReference, ReferenceLost> {
+        Err(ReferenceLost::NotHomed)
     }
 
     /// Counts as homed again, when what was read last shows that its coordinates are those in which `then` was read.

@@ -20,8 +20,9 @@ pub enum ReferenceProof {
         /// From 0, the lowest.
         bit: u8,
     },
-    /// The encoder is absolute, and the drive keeps what it adds to the encoder's position (0x6063) without power.
-    AbsoluteEncoder,
+    /// The encoder is absolute over the whole travel, its own position is in this object, which no homing changes, and the
+    /// drive keeps without power what it adds to that.
+    AbsoluteEncoder(Object),
 }
 
 /// What a drive shows of its reference.
@@ -37,7 +38,9 @@ pub struct DriveReference {
     pub home_offset: u32,
     /// 0x6064, position units.
     pub position: i32,
-    /// 0x6063, encoder increments, where the drive has it.
+    /// 0x607E, where the drive has it: in which direction it counts.
+    pub polarity: u32,
+    /// The encoder's own position, increments, where the drive has it: 0x6063, or what its proof names.
     pub increments: Option<i32>,
     /// By how many increments it changed while the position was read.
     pub moved: u32,
@@ -62,10 +65,12 @@ pub enum ReferenceLost {
     /// By its own word.
     #[error("the drive itself says that it is not homed")]
     NotHomed,
-    /// Somebody has written what homing uses.
-    #[error("{object} is {seen:#X} and no longer {expected:#X}; somebody else has homed the drive")]
-    Homed {
-        /// The homing method or the home offset.
+    /// Somebody has written what says where and in which direction it counts.
+    #[error(
+        "{object} is {seen:#X} and no longer {expected:#X}: another program has set the drive's coordinates"
+    )]
+    Changed {
+        /// The homing method, the home offset or the polarity.
         object: Object,
         /// As our zero left it.
         expected: u32,
@@ -74,16 +79,38 @@ pub enum ReferenceLost {
     },
     /// The drive adds something else to the encoder's position than it did.
     #[error(
-        "position (0x6064) and encoder (0x6063) are {counts} counts farther apart than at its zero: the origin \
-         was moved, or encoder or drive were without power"
+        "position (0x6064) and encoder are {counts} counts farther apart than at its zero: the origin was moved, or \
+         encoder or drive were without power"
     )]
     Shifted {
         /// By so many position units.
         counts: i64,
     },
-    /// 0x6063 is not there, and without it an absolute encoder proves nothing.
-    #[error("the drive has no encoder position (0x6063) to compare its coordinates with")]
+    /// It is beyond what the drive's 32 bits can tell apart.
+    #[error(
+        "it has turned beyond the 32 bits of the drive's position since, which tells no turns apart then"
+    )]
+    Overrun,
+    /// The encoder's position is not there, or not any more.
+    #[error(
+        "the drive does not show the position of its encoder, which its own must be compared with"
+    )]
     NoEncoder,
+    /// What should be the encoder's own position changed with homing.
+    #[error(
+        "{object} changed with the position when the drive was homed: it is not the encoder's own position, and proves \
+         nothing"
+    )]
+    NotOfEncoder {
+        /// Which object.
+        object: Object,
+    },
+    /// Nothing can be compared while it moves.
+    #[error("the axis moved by {increments} increments while it was read")]
+    Moving {
+        /// By so many.
+        increments: u32,
+    },
     /// It found something wrong meanwhile.
     #[error("the drive reports error {code:#06X}")]
     Fault {

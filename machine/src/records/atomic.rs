@@ -1,7 +1,7 @@
 //! Writing a file so that a crash at any moment leaves the old one or the new one.
 
 use std::fs::{self, File, Permissions};
-use std::io::Write;
+use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
@@ -53,6 +53,18 @@ pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError>
     file.persist(path)
         .map_err(|error| io_error("rename the temporary file to it", path)(error.error))?;
     sync_folder(folder)
+}
+
+/// Removes `path`, which need not be there, so that it does not come back after a crash.
+///
+/// # Errors
+/// What the operating system says.
+pub fn remove_durably(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error),
+        Ok(()) => File::open(path.parent().unwrap_or(Path::new(".")))?.sync_all(),
+    }
 }
 
 /// A rename is durable only when its folder is.

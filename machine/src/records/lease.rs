@@ -1,8 +1,10 @@
 //! A machine is used by one program at a time.
 
+use core::time::Duration;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
+use std::thread;
 
 use nix::fcntl::{Flock, FlockArg};
 
@@ -29,6 +31,21 @@ pub struct Lease {
     lock: Flock<File>,
 }
 
+/// Whoever only looks who has the machine locks the file for a moment, too.
+const LOOKS: u32 = 3;
+const LOOK: Duration = Duration::from_millis(10);
+
+fn lock(mut file: File) -> Result<Flock<File>, File> {
+    for _ in 1..LOOKS {
+        match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+            Ok(lock) => return Ok(lock),
+            Err((taken, _)) => file = taken,
+        }
+        thread::sleep(LOOK);
+    }
+    Flock::lock(file, FlockArg::LockExclusiveNonblock).map_err(|(file, _)| file)
+}
+
 /// What stands before each place in the lease of a program that lets others ask.
 const PLACE: &str = "listening at ";
 
@@ -47,12 +64,12 @@ impl Lease {
             .truncate(false)
             .open(&path)
             .map_err(|error| not_opened(store, error))?;
-        match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+        match lock(file) {
             Ok(mut lock) => {
                 name_owner(&mut lock, verb).map_err(io_error("write", &path))?;
                 Ok(Self { lock })
             }
-            Err((mut file, _)) => {
+            Err(mut file) => {
                 let (owner, places) = said_in(&mut file);
                 Err(StoreError::Leased { owner, places })
             }

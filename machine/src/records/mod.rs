@@ -41,7 +41,7 @@ pub mod sound;
 mod store;
 mod thermometers;
 
-pub use atomic::write_new_or_replace;
+pub use atomic::{remove_durably, write_new_or_replace};
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
 pub use failure::{ModelError, StoreError};

@@ -37,6 +37,9 @@ const SAMPLE_MS: core::ops::RangeInclusive<u64> = 1..=60_000;
 #[serde(deny_unknown_fields)]
 pub(super) struct Wanted {
     /// Only these kinds, with commas between: `motion,run,axis`.
+    #[param(
+        pattern = "^(machine|axis|position|motion|run|stop|lease|calibration|question|point|warning)(,(machine|axis|position|motion|run|stop|lease|calibration|question|point|warning))*$"
+    )]
     kinds: Option<String>,
     /// After the event of this number; the header `Last-Event-ID` says the same.
     after: Option<u64>,
@@ -141,7 +144,7 @@ pub(super) async fn events(
 
 /// The kinds with commas between, each of which there must be: a word that is misspelt would wait for ever.
 fn kinds_of(text: &str) -> Result<BTreeSet<String>, Problem> {
-    let kinds: BTreeSet<String> = text.split(',').map(|it| it.trim().to_owned()).collect();
+    let kinds: BTreeSet<String> = text.split(',').map(str::to_owned).collect();
     match kinds.iter().find(|it| !Event::KINDS.contains(&it.as_str())) {
         None => Ok(kinds),
         Some(other) => Err(Problem::new(

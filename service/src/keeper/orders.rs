@@ -93,7 +93,7 @@ impl Keeper {
             (Mode::Safe, Some(cause)) => Err(Problem::new(
                 Code::ErrorStop,
                 format!("the machine was stopped: {}", cause.cause),
-                "remove the cause, then reset; axes must be zeroed again",
+                "remove the cause, then reset; what has lost its zero must be zeroed again",
             )),
             (Mode::Starting | Mode::Safe, _) => Err(Problem::new(
                 Code::Busy,

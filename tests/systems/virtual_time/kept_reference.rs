@@ -15,7 +15,9 @@ use units::{Metres, Radians};
 
 const MARK: &str = "{ by = \"mark\", object = \"0x2F00:02\" }";
 const BIT: &str = "{ by = \"homed_bit\", object = \"0x6041:00\", bit = 15 }";
-const ABSOLUTE: &str = "{ by = \"absolute_encoder\" }";
+const ABSOLUTE: &str = "{ by = \"absolute_encoder\", object = \"0x6063:00\" }";
+/// What counts with the position, also when that is homed.
+const POSITION: &str = "{ by = \"absolute_encoder\", object = \"0x6064:00\" }";
 /// Each count of the stage, and what its servo holds.
 const STANDS: Metres = Metres(50e-9);
 
@@ -200,7 +202,7 @@ fn a_zero_that_was_broken_off_leaves_none() {
 fn who_homes_the_drive_behind_our_back_takes_its_zero() {
     for (proof, why) in [
         (MARK, "the mark"),
-        (BIT, "somebody else"),
+        (BIT, "another program"),
         (ABSOLUTE, "farther apart"),
     ] {
         let mut bench = stage(proof, "");
@@ -230,6 +232,88 @@ fn who_homes_the_drive_behind_our_back_takes_its_zero() {
             "nobody has touched it"
         );
         has_lost_it(&mut bench, why);
+    }
+}
+
+#[test]
+fn what_is_no_encoder_of_its_own_proves_nothing() {
+    let mut bench = stage(POSITION, "");
+    again(&mut bench);
+    let warned = Rc::new(RefCell::new(Vec::new()));
+    bench.machine.observe(Box::new(Warned(Rc::clone(&warned))));
+    zeroed(&mut bench);
+    let told = warned.take();
+    assert!(
+        told[0].contains("changed with the position when the drive was homed"),
+        "{told:?}"
+    );
+    assert!(has_its_zero(&bench), "as long as the program lives");
+    assert!(again(&mut bench).is_empty() && !has_its_zero(&bench));
+}
+
+#[test]
+fn a_fault_that_is_reset_gives_no_zero_back() {
+    for proof in [MARK, BIT, ABSOLUTE] {
+        let mut bench = stage(proof, "");
+        zeroed(&mut bench);
+        // It moves, the program dies, and something is in the way.
+        let target = Metres::from_mm(50.0);
+        let (speed, acceleration) = (
+            units::MetresPerSecond(0.1),
+            units::MetresPerSecondSquared(1.0),
+        );
+        let moving = drivers::device::AxisCommand::MoveTo {
+            target,
+            speed,
+            acceleration,
+        };
+        bench
+            .machine
+            .begin("x", moving)
+            .unwrap_or_else(|failure| panic!("{failure}"));
+        let until = bench.machine.now() + Duration::from_millis(100);
+        bench
+            .machine
+            .run_until(until)
+            .unwrap_or_else(|failure| panic!("{failure}"));
+        let blocked = FaultConfig::permanent(Fault::BlockedAxis { axis: 0 });
+        let blocked = bench.emulated.simulation_mut().inject(blocked);
+        let blocked = blocked.unwrap_or_else(|error| panic!("{error}"));
+        bench.machine = Machine::new(&bench.loaded, Box::new(bench.emulated.transport()));
+        let until = bench.machine.now() + Duration::from_millis(300);
+        bench
+            .machine
+            .run_until(until)
+            .unwrap_or_else(|failure| panic!("{failure}"));
+        bench.emulated.simulation_mut().end_fault(blocked);
+        has_lost_it(&mut bench, "the drive reports error 0x8611");
+        let reset = bench.machine.reset_fault("x");
+        reset.unwrap_or_else(|failure| panic!("{failure}"));
+        for _ in 0..2 {
+            assert!(again(&mut bench).is_empty(), "{proof}: nothing is noted");
+            assert!(
+                !has_its_zero(&bench),
+                "{proof}: what was found wrong is believed"
+            );
+        }
+    }
+}
+
+#[test]
+fn sides_of_a_gantry_and_screws_of_a_platform_keep_none() {
+    for (text, axis, says) in [
+        (
+            tests::GANTRY.machine,
+            "x1",
+            "may be moved without the other",
+        ),
+        (tests::UVW.machine, "u", "what its camera saw"),
+    ] {
+        let head = format!("\n[axis.{axis}]\n");
+        let text = text.edit(&head, &format!("{head}kept_zero = {MARK}\n"));
+        let refused = truestage::config::parse(&text, "machine.toml");
+        let told = refused.expect_err("it is refused").to_string();
+        assert!(told.contains(says), "{told}");
     }
 }
 

@@ -19,9 +19,9 @@ use wire::{Arrival, Payload, Port};
 const PROOFS: [&str; 4] = [
     "{ by = \"mark\", object = \"0x2F00:01\" }",
     "{ by = \"homed_bit\", object = \"0x6041:00\", bit = 8 }",
-    "{ by = \"absolute_encoder\" }",
+    "{ by = \"absolute_encoder\", object = \"0x6063:00\" }",
     // The same, on a drive whose encoder is one.
-    "{ by = \"absolute_encoder\" } # indeed",
+    "{ by = \"absolute_encoder\", object = \"0x6063:00\" } # indeed",
 ];
 /// Position and scale are each known to a count; more is another origin.
 const SAME: Metres = Metres(25e-9);

@@ -74,6 +74,14 @@ pub struct Task<'a> {
 }
 
 impl DriveConfig {
+    /// Whether it is to prove at a start that it kept its zero.
+    pub(crate) const fn keeps_zero(&self) -> bool {
+        match self {
+            Self::Cia402(family) => family.kept_zero.is_some(),
+            Self::Copley(_) => false,
+        }
+    }
+
     pub(crate) fn family(&self) -> &dyn Family {
         match self {
             Self::Cia402(family) => family,

@@ -46,6 +46,17 @@ fn check_sides(judge: &mut Judge<'_>, config: &MachineConfig, gantry: &GantryCon
         );
     }
     for axis in &gantry.axes {
+        if config
+            .axis
+            .get(axis)
+            .is_some_and(|it| it.drive.keeps_zero())
+        {
+            judge.say(
+                "axes",
+                format!("`{axis}` has a `kept_zero`, and one side that has its zero may be moved without the other"),
+                format!("remove axis.{axis}.kept_zero: both sides are zeroed together, after each start"),
+            );
+        }
         judge.known("axes", axis, &config.axis, "linear axis");
         if config.axis.get(axis).is_some_and(|it| it.zero.is_none()) {
             judge.say(

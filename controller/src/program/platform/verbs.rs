@@ -182,15 +182,12 @@ fn moved_text(moved: &PoseMoved) -> String {
     let mut text = format!("\nscrews: {}{skew}", set_points.join(", "));
     for it in &moved.taken_up {
         let doubt = it.standard_uncertainty.map_or(String::new(), |u| {
-            format!(" (standard uncertainty of its place {:.3} µm)", u.um())
+            format!(" (its place: U = {:.3} µm, k = 2)", 2.0 * u.um())
         });
         text += &format!("\nplay of {} taken up first{doubt}", it.axis);
     }
     if let Some(u) = moved.standard_uncertainty() {
-        text += &format!(
-            "\nstandard uncertainty of the screws' places {:.3} µm",
-            u.um()
-        );
+        text += &format!("\nplaces of the screws: U = {:.3} µm (k = 2)", 2.0 * u.um());
     }
     text
 }

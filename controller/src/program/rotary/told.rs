@@ -255,9 +255,9 @@ pub(crate) fn verified_value(verified: &RotaryVerified) -> Value {
 
 fn moved_text(axis: &str, moved: &RotaryMoved, calibration: Option<&str>) -> String {
     let by = calibration.map_or("not corrected".to_owned(), short);
-    let u = moved
-        .standard_uncertainty
-        .map_or(String::new(), |u| format!(", u = {:.4}″", u.arcsec()));
+    let u = moved.standard_uncertainty.map_or(String::new(), |u| {
+        format!(", U = {:.4}″ (k = 2)", 2.0 * u.arcsec())
+    });
     format!(
         "axis {axis}: target {:.7}°, set-point {:.7}°, is at {:.7}° ({by}{u}){}",
         moved.target.degrees(),

@@ -275,6 +275,16 @@ fn services() -> Vec<Form> {
             "events that were missed, by their numbers",
             [("from", whole()), ("to", whole())],
         ),
+        Form::new(
+            "enable",
+            "axes that were switched on",
+            [("axes", list(of("POST /v1/axes/{axis}/enable")))],
+        ),
+        Form::new(
+            "disable",
+            "axes that were switched off",
+            [("axes", list(of("POST /v1/axes/{axis}/disable")))],
+        ),
         Form::new("stop", "a stop is under way", [("done", constant(true))]),
         Form::new(
             "token",

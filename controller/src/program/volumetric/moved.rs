@@ -30,12 +30,12 @@ fn live_text(live: &Live) -> String {
     let rows = AXES.iter().enumerate().map(|(k, name)| {
         let offset = live.offset[k].um();
         let u = match live.uncertainty[k].um() {
-            known if known.is_finite() => format!("{known:.3} µm"),
+            known if known.is_finite() => format!("{:.3} µm (k = 2)", 2.0 * known),
             _ => "unknown".into(),
         };
         let set_point = (live.nominal[k] + live.offset[k]).mm();
         format!(
-            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, u {u}",
+            "{name}: target {:.6} mm, set-point {set_point:.6} mm, correction {offset:+.3} µm, U {u}",
             live.nominal[k].mm()
         )
     });

@@ -53,8 +53,8 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
         self.settings.reference_proof.is_some()
     }
 
-    fn reference(&self) -> Option<DriveReference> {
-        self.reference
+    fn reference(&self) -> Result<DriveReference, ReferenceLost> {
+        self.shown_reference()
     }
 
     fn take_up_reference(&mut self, then: &DriveReference) -> Result<(), ReferenceLost> {

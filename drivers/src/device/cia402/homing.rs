@@ -7,6 +7,7 @@ use wire::cia402::{Controlword, HomingStatus, OperationMode};
 
 use super::convert::{counts_i32, position_counts};
 use super::modulo::apart;
+use super::reference::before_home;
 use super::settings::HomeOffset;
 use super::start::{HOME_OFFSET, MODE, homing_steps};
 use super::{Activity, Cia402Drive};
@@ -102,7 +103,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 HomeOffset::IsPositionAtHome => shown,
                 HomeOffset::IsZeroFromHome => -shown,
             };
-            let steps = homing_steps(&self.settings, method, offset, search)?;
+            let mut steps = homing_steps(&self.settings, method, offset, search)?;
+            let first = before_home(&self.settings).filter(|_| search.is_none());
+            steps.splice(0..0, first);
             Ok((counts, steps))
         });
         match plan {
@@ -110,6 +113,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Ok((position, steps)) => {
                 self.reached = None;
                 self.homed = false;
+                self.before_home = None;
                 self.image.plausible.allow_jumps(true);
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,

@@ -63,6 +63,7 @@ use image::{Image, Sample};
 use latch::{LatchChange, Probe};
 use motion::{Halt, Move};
 use power::Power;
+use reference::BeforeHome;
 
 /// The profile number in 0x1000.
 const PROFILE: u16 = 402;
@@ -152,6 +153,7 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     homed: bool,
     /// What showed its reference when it was read last.
     reference: Option<DriveReference>,
+    before_home: Option<BeforeHome>,
     /// The newest process data of a start, not yet compared with the objects themselves.
     first: Option<Sample>,
     /// What the object was that is compared with them.
@@ -216,6 +218,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             started_at: None,
             homed: false,
             reference: None,
+            before_home: None,
             first: None,
             compared: None,
             kept: None,
@@ -364,7 +367,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         match &self.activity {
             Activity::Starting => self.end_start(now, script),
             Activity::Move(_) => self.move_prepared(now),
-            Activity::Homing(_) => self.homing_prepared(now),
+            Activity::Homing(_) => {
+                self.note_before_home(script);
+                self.homing_prepared(now);
+            }
             Activity::Latch(_) => self.latch_written(now),
             Activity::Mode(_) => self.mode_written(now),
             Activity::Reference { .. } => self.reference_read(script),

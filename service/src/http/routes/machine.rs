@@ -134,7 +134,7 @@ pub(super) async fn stop(
     }))
 }
 
-/// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again.
+/// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again, but those whose drives prove that they kept their zero.
 #[utoipa::path(
     post, path = "/reset", tag = "machine", params(Asks),
     responses(

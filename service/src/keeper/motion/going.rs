@@ -57,7 +57,8 @@ impl Going {
             return Ok(planned);
         }
         let what = format!("axis {} is switched off; nothing was moved", seat.name);
-        Err(Problem::new(Code::AxisDisabled, what, "enable it first"))
+        let help = "enable it first, as `truestage enable` does";
+        Err(Problem::new(Code::AxisDisabled, what, help))
     }
 
     /// Where its point goes; angles count on over the turns.
@@ -112,7 +113,9 @@ impl Going {
             Self::Along(it) => {
                 let reading = machine.reading(&seat.name).ok().flatten();
                 let here = reading.map_or(it.set_point, |it| it.position);
-                ((it.set_point - here).value(), it.speed.value())
+                let from = it.by_way_of.unwrap_or(here);
+                let way = (from - here).abs() + (it.set_point - from).abs();
+                (way.value(), it.speed.value())
             }
             Self::Round(it) => {
                 let reading = machine.devices().rotary_reading(&seat.name).ok().flatten();
