@@ -13,7 +13,6 @@ use drivers::device::{DriveCommand, ReferenceLost, ServoDrive};
 use crate::failure::Failure;
 use crate::machine::Machine;
 use crate::records::IdentityRecord;
-use crate::stopping::STOP_LIMIT;
 use crate::zero_notes::{KeptZeros, Note, VERSION};
 
 /// Notes in `folder` what the drives of `machine` show of their reference, of those that prove it, and believes at a start
@@ -72,7 +71,7 @@ fn read(
     mark: Option<u32>,
 ) -> Result<Result<(), String>, Failure> {
     let command = DriveCommand::ReadReference { mark };
-    match machine.control(at, command, "reading its reference", STOP_LIMIT) {
+    match machine.control(at, command, "reading its reference", LIMIT) {
         Ok(()) => Ok(Ok(())),
         Err(refused @ (Failure::Device { .. } | Failure::Overdue { .. })) => {
             Ok(Err(refused.to_string()))
@@ -80,6 +79,9 @@ fn read(
         Err(failure) => Err(failure),
     }
 }
+
+/// The longest that some dozen SDO transfers may take.
+const LIMIT: Duration = Duration::from_secs(2);
 
 /// An axis that is homed on its way stops somewhere behind: it is read again, so many times and so long after.
 const READINGS: u32 = 40;
@@ -146,11 +148,24 @@ pub(crate) fn forget(machine: &Machine, at: usize) -> Result<(), Failure> {
     }
 }
 
+/// Forgets what an alarm has made doubtful, now that there is time for files.
+pub(crate) fn forget_doubted(machine: &mut Machine) {
+    for at in 0..machine.doubted.len() {
+        if !std::mem::take(&mut machine.doubted[at]) {
+            continue;
+        }
+        if let Err(failure) = forget(machine, at) {
+            machine.notices.warn(failure.to_string());
+        }
+    }
+}
+
 /// At a start, everything stands: gives their zeros back to the axes whose drives have kept their reference.
 ///
 /// # Errors
 /// Whatever stops the machine. That a drive does not prove it is none: its axis has no zero then.
 pub(crate) fn take_up(machine: &mut Machine) -> Result<(), Failure> {
+    forget_doubted(machine);
     for at in 0..machine.devices.drive_count() {
         if !machine.devices.drive(at).proves_reference() {
             continue;
@@ -166,7 +181,13 @@ pub(crate) fn take_up(machine: &mut Machine) -> Result<(), Failure> {
             }
             Holds::Unread(why) => why,
             Holds::No(why) => {
-                give_up(machine, at)?;
+                forget(machine, at)?;
+                why
+            }
+            Holds::Refuted(why) => {
+                forget(machine, at)?;
+                // A note of the same mark may lie elsewhere.
+                let _ = read(machine, at, Some(0))?;
                 why
             }
         };
@@ -177,18 +198,15 @@ pub(crate) fn take_up(machine: &mut Machine) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was found wrong once is not believed when it looks right later: a fault that was reset leaves no trace.
-fn give_up(machine: &mut Machine, at: usize) -> Result<(), Failure> {
-    forget(machine, at)?;
-    // A note of the same mark may lie elsewhere; a drive that does not take it has said so by being read.
-    read(machine, at, Some(0)).map(drop)
-}
-
 enum Holds {
     Yes,
-    /// It could not be asked.
+    /// It could not be asked, or moves.
     Unread(String),
+    /// The note is of something else.
     No(String),
+    /// The drive speaks against it. What was found wrong once is not believed when it looks right later: a fault that was
+    /// reset leaves no trace.
+    Refuted(String),
 }
 
 fn still_holds(machine: &mut Machine, at: usize, note: &Note) -> Result<Holds, Failure> {
@@ -199,7 +217,12 @@ fn still_holds(machine: &mut Machine, at: usize, note: &Note) -> Result<Holds, F
     let judged = read_at_rest(machine, at, None, |drive| drive.take_up_reference(&then))?;
     Ok(match judged {
         Ok(Ok(())) => Holds::Yes,
-        Ok(Err(why)) => Holds::No(why.to_string()),
+        Ok(Err(why @ (ReferenceLost::Moving { .. } | ReferenceLost::NoEncoder))) => {
+            Holds::Unread(why.to_string())
+        }
+        // The object holds what another has written.
+        Ok(Err(why @ ReferenceLost::Mark { .. })) => Holds::No(why.to_string()),
+        Ok(Err(why)) => Holds::Refuted(why.to_string()),
         Err(why) => Holds::Unread(why),
     })
 }

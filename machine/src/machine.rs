@@ -87,6 +87,8 @@ pub struct Machine {
     pub(crate) zeroed: Vec<bool>,
     /// What is noted of them for the next start.
     pub(crate) kept_zeros: Option<KeptZeros>,
+    /// By the numbers of the drives: what is noted must go as soon as there is time for files.
+    pub(crate) doubted: Vec<bool>,
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
@@ -125,6 +127,7 @@ impl Machine {
             approach: vec![ApproachTracker::new(); axes.len()],
             zeroed: vec![false; axes.len() + parts.rotaries.len()],
             kept_zeros: None,
+            doubted: vec![false; axes.len() + parts.rotaries.len()],
             devices: Devices {
                 axes,
                 rotaries: parts.rotaries,

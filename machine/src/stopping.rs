@@ -6,6 +6,7 @@ use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
 
 use crate::failure::{Failure, Layered};
+use crate::kept_zero;
 use crate::machine::{Machine, Supervision};
 
 /// The longest a stop may take before the next drive is tried.
@@ -121,5 +122,6 @@ impl Machine {
         self.approach.iter_mut().for_each(ApproachTracker::forget);
         let _ = self.ports.set_sync(&mut *self.transport, false);
         self.supervision = Supervision::Off;
+        kept_zero::forget_doubted(self);
     }
 }

@@ -11,7 +11,6 @@ use wire::can::{BusError, BusErrorClass, ControllerProblem};
 use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::failure::Failure;
-use crate::kept_zero;
 use crate::machine::{Machine, Supervision, call_attendant};
 use crate::outbox::Sender;
 
@@ -197,12 +196,8 @@ impl Machine {
             if takes_reference(alarm) {
                 self.zeroed[*at] = false;
             }
-            // The alarm is what stops the machine, and is told.
-            if !is_of_communication(alarm)
-                && let Err(failure) = kept_zero::forget(self, *at)
-            {
-                self.notices.warn(failure.to_string());
-            }
+            // Nothing is done with files before everything has been stopped.
+            self.doubted[*at] |= !is_of_communication(alarm);
         }
         // An instrument or a camera that nobody reads may have its beam blocked.
         let machines_own = self.devices.instrument_device(0);

@@ -25,6 +25,7 @@ fn follows_a_path_of_three_axes(path: &Value) {
     // Four seconds of periods of 60 ms, and the last row itself.
     said("planned", "68 points");
     said("planned", "4 s at least");
+    said("planned", "bus load can0 ");
     let stood = path["ended"].as_array().expect("where each axis is");
     let stood = stood.iter().map(|it| it.as_f64().expect("in millimetres"));
     for (axis, (mm, expected)) in stood.zip([9.0, 9.0, 5.0]).enumerate() {

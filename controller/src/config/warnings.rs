@@ -42,10 +42,10 @@ fn check_paths(config: &MachineConfig, found: &mut Vec<Finding>) {
 }
 
 /// What converters of serial lines are made for, in bit/s; others take the nearest that they can, without a word.
-const USUAL_RATES: [u32; 24] = [
-    300, 600, 1200, 2400, 4800, 9600, 14_400, 19_200, 28_800, 38_400, 57_600, 76_800, 115_200,
-    128_000, 230_400, 250_000, 256_000, 460_800, 500_000, 576_000, 921_600, 1_000_000, 2_000_000,
-    3_000_000,
+const USUAL_RATES: [u32; 34] = [
+    50, 75, 110, 134, 150, 200, 300, 600, 1200, 1800, 2400, 4800, 9600, 14_400, 19_200, 28_800,
+    38_400, 57_600, 76_800, 115_200, 128_000, 230_400, 250_000, 256_000, 460_800, 500_000, 576_000,
+    921_600, 1_000_000, 1_152_000, 1_500_000, 2_000_000, 3_000_000, 4_000_000,
 ];
 
 fn check_rates(config: &MachineConfig, found: &mut Vec<Finding>) {

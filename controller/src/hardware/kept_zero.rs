@@ -46,6 +46,11 @@ const FIRST_OF_MANUFACTURER: u16 = 0x2000;
 const FIRST_OF_PROFILES: u16 = 0x6000;
 
 impl KeptZeroConfig {
+    /// Whether it asks for an encoder that needs no reference.
+    pub(crate) fn is_absolute(&self) -> bool {
+        self.by == KeptZeroName::AbsoluteEncoder
+    }
+
     pub(crate) fn check(&self, judge: &mut Judge<'_>) {
         const OBJECT: &str = "kept_zero.object";
         const BIT: &str = "kept_zero.bit";
@@ -55,6 +60,11 @@ impl KeptZeroConfig {
                 OBJECT,
                 format!("`{}` is no object", self.object),
                 "give index and sub-index as the drive's manual has them, such as \"0x2F00:01\"",
+            ),
+            Some(it) if self.by == KeptZeroName::AbsoluteEncoder && !may_be_encoder(it) => judge.say(
+                OBJECT,
+                format!("{it} is not an encoder's own position"),
+                "give 0x6063, where the drive does not count that with its homing, or an object of the manufacturer's",
             ),
             Some(it) if self.by == KeptZeroName::Mark && !is_manufacturers(it) => judge.say(
                 OBJECT,
@@ -95,6 +105,12 @@ impl KeptZeroConfig {
 const STATUSWORD: Object = Object::new(0x6041, 0);
 /// The bits of it that CiA 402 leaves to the manufacturer.
 const OF_MANUFACTURER: [u8; 3] = [8, 14, 15];
+
+const INCREMENTS: Object = Object::new(0x6063, 0);
+
+fn may_be_encoder(object: Object) -> bool {
+    object == INCREMENTS || is_manufacturers(object)
+}
 
 fn is_manufacturers(object: Object) -> bool {
     (FIRST_OF_MANUFACTURER..FIRST_OF_PROFILES).contains(&object.index)

@@ -9,6 +9,7 @@ use compensator::hall_zero::SettingsError;
 use crate::assemble;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
+use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::linear::check::gantry::check_gantries;
 use crate::linear::positions::spaced;
 use crate::linear::{CalibrateConfig, CompensationConfig, EndPolicyName, VerifyConfig, ZeroConfig};
@@ -28,6 +29,18 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
 }
 
 fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, axis: &AxisConfig) {
+    if axis.zero.is_none()
+        && axis
+            .drive
+            .kept_zero()
+            .is_some_and(KeptZeroConfig::is_absolute)
+    {
+        Judge::at(format!("axis.{name}"), findings).say(
+            "kept_zero.by",
+            "is for an axis that is homed where it stands, and this one has no zero of its own",
+            format!("add [axis.{name}.zero], take another proof, or remove it"),
+        );
+    }
     if let Some(zero) = &axis.zero {
         check_zero(
             &mut Judge::at(format!("axis.{name}.zero"), findings),

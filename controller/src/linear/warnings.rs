@@ -23,6 +23,7 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
         check_window(judge, axis);
         check_stopping(judge, axis);
         check_reference(judge, axis);
+        check_units(judge, axis);
         for stage in [Stage::Calibrate, Stage::Verify] {
             check_duration(judge, axis, stage);
         }
@@ -63,6 +64,47 @@ fn check_window(judge: &mut Judge<'_>, axis: &AxisConfig) {
     }
 }
 
+/// Registers are whole numbers: a driver asks for one unit at least.
+fn check_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let [speed_counts, acceleration_counts] = axis.drive.family().register_units();
+    let motion = &axis.motion;
+    let count_mm = motion.resolution_nm.abs() * 1e-6;
+    for (key, value, counts, unit) in [
+        (
+            "speed_mm_per_s",
+            motion.speed_mm_per_s,
+            speed_counts,
+            "mm/s",
+        ),
+        (
+            "acceleration_mm_per_s2",
+            motion.acceleration_mm_per_s2,
+            acceleration_counts,
+            "mm/s²",
+        ),
+        (
+            "quick_stop_deceleration_mm_per_s2",
+            motion.quick_stop_deceleration_mm_per_s2,
+            acceleration_counts,
+            "mm/s²",
+        ),
+    ] {
+        let least = count_mm * counts;
+        if value < least {
+            judge.say(
+                key,
+                format!(
+                    "{} {unit} are less than one unit of the drive with a resolution of {} nm, and it takes {} {unit}",
+                    Short(value),
+                    Short(motion.resolution_nm),
+                    Short(least)
+                ),
+                "raise it, or look at resolution_nm",
+            );
+        }
+    }
+}
+
 /// Behind a limit switch there is so much way to the end of a stage, seldom more.
 const BEHIND_SWITCH_MM: f64 = 3.0;
 
@@ -86,7 +128,7 @@ fn check_reference(judge: &mut Judge<'_>, axis: &AxisConfig) {
             ),
             format!(
                 "give {} mm/s or less",
-                Short((2.0 * HOMING_SHARE * hardest * BEHIND_SWITCH_MM).sqrt().floor())
+                Short((2.0 * HOMING_SHARE * hardest * BEHIND_SWITCH_MM * 1e4).sqrt().floor() * 1e-2)
             ),
         );
     }

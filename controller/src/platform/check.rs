@@ -93,7 +93,7 @@ fn check_references(
         if config
             .axis
             .get(&actuator.axis)
-            .is_some_and(|it| it.drive.keeps_zero())
+            .is_some_and(|it| it.drive.kept_zero().is_some())
         {
             let axis = &actuator.axis;
             judge.say(

@@ -84,8 +84,11 @@ fn planned(machine: &mut Machine, _: &str, task: &Task) -> Result<Planned, Failu
             let places: usize = strokes.iter().map(|it| it.targets().len()).sum();
             let points = 2 * places as u64 * u64::from(own.runs);
             // There and back in each run.
-            let ways = strokes.iter().map(|it| 2.0 * (it.last_mm - it.first_mm));
-            let travel = Metres::from_mm(ways.sum::<f64>() * f64::from(own.runs));
+            let ways = strokes.iter().map(|it| match it.targets().as_slice() {
+                [first, .., last] => (*last - *first).value(),
+                _ => 0.0,
+            });
+            let travel = Metres(2.0 * ways.sum::<f64>() * f64::from(own.runs));
             let axes = config
                 .actuator
                 .iter()

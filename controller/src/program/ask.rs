@@ -52,15 +52,30 @@ pub(crate) fn power(args: &PowerArgs, on: bool, output: Output) -> Ended {
     } else {
         ("disable", "off")
     };
-    let mut switched = Vec::new();
+    // One that is in use keeps nobody from the others: whoever asks wants his hands in the machine.
+    let (mut switched, mut refused) = (Vec::new(), None);
     for name in &names {
-        switched.push(ask(&at, "POST", &format!("/v1/axes/{name}/{verb}"), "{}")?);
+        match ask(&at, "POST", &format!("/v1/axes/{name}/{verb}"), "{}") {
+            Ok(axis) => switched.push((*name, axis)),
+            Err(failure) => {
+                refused.get_or_insert(failure);
+            }
+        }
     }
-    let lines: Vec<String> = names
+    let lines = switched
         .iter()
-        .map(|it| format!("axis {} is {is}", plain(it)))
-        .collect();
-    output.result(&lines.join("\n"), &json!({"axes": switched}))
+        .map(|(name, _)| format!("axis {} is {is}", plain(name)));
+    let text = lines.collect::<Vec<_>>().join("\n");
+    match refused {
+        None => {
+            let axes: Vec<&Value> = switched.iter().map(|it| &it.1).collect();
+            output.result(&text, &json!({"axes": axes}))
+        }
+        Some(failure) => {
+            output.note(&text);
+            Err(failure)
+        }
+    }
 }
 
 fn text_of(machine: &Value, axes: &Value) -> String {

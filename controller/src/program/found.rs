@@ -47,6 +47,17 @@ impl ServiceArgs {
     }
 }
 
+/// What `[machine]` says of `key`, line by line: the rest of the file may be none just now.
+fn said(text: &str, key: &str) -> Option<String> {
+    let lines = text.lines().map(str::trim);
+    let own = lines.skip_while(|it| !it.starts_with("[machine]")).skip(1);
+    let mut own = own.take_while(|it| !it.starts_with('['));
+    own.find_map(|line| {
+        let line: Table = line.parse().ok()?;
+        Some(line.get(key)?.as_str()?.to_owned())
+    })
+}
+
 /// Who has a machine. A configuration that is wrong, because somebody edits it, says all the same whose it is: a stop must
 /// not fail by that.
 struct Kept {
@@ -58,10 +69,8 @@ struct Kept {
 impl Kept {
     fn of(path: &Path) -> Option<Self> {
         let text = std::fs::read_to_string(path).ok()?;
-        let document: Table = text.parse().ok()?;
-        let machine = document.get("machine")?.as_table()?;
-        let name = machine.get("name")?.as_str()?.to_owned();
-        let data_dir = machine.get("data_dir")?.as_str()?;
+        let name = said(&text, "name")?;
+        let data_dir = said(&text, "data_dir")?;
         let data_dir = path.parent().unwrap_or(Path::new("")).join(data_dir);
         let owner = Lease::owner(&Store::new(&data_dir, &name, &[]));
         let (owner, places) = owner.map_or((None, Vec::new()), |(it, places)| (Some(it), places));

@@ -4,6 +4,8 @@
 pub(crate) fn plain(text: &str) -> String {
     text.chars()
         .filter(|it| !it.is_control() || matches!(it, '\n' | '\t'))
+        // What turns the direction of a line round.
+        .filter(|it| !matches!(it, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'))
         .collect()
 }
 

@@ -8,7 +8,7 @@ use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
 use crate::config::validate::drive::check_axis_name;
 use crate::hardware::analog::check_input;
-use crate::rotary::{RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
+use crate::rotary::{PositionRangeName, RotaryCalibrateConfig, RotaryConfig, RotaryVerifyConfig};
 
 pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>) {
     for (name, rotary) in &config.rotary {
@@ -277,11 +277,31 @@ fn check_verify(
     }
 }
 
+/// Positions of 32 bits.
+const REGISTER: u64 = 1 << 32;
+
 fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
     let speed_max = rotary.speed_max_deg_per_s;
     judge.within("speed_deg_per_s", rotary.speed_deg_per_s, 0.0, speed_max);
     if let Some(kept) = &rotary.kept_zero {
         kept.check(judge);
+        if kept.is_absolute() {
+            judge.say(
+                "kept_zero.by",
+                "is for an axis that is homed where it stands, and a table is homed on its encoder's index mark",
+                "take another proof, or remove it",
+            );
+        }
+        if rotary.position_range == PositionRangeName::CountsOn
+            && !REGISTER.is_multiple_of(u64::from(rotary.counts_per_turn.max(1)))
+        {
+            judge.say(
+                "kept_zero",
+                "is not possible where the drive counts on: where its 32 bits are full, it begins anew within a turn, and \
+                 nobody sees after a start how often it has",
+                "let the position wrap at a turn (`position_range`), or remove it",
+            );
+        }
     }
     rotary.node.check(judge, &config.can);
 }

@@ -86,11 +86,6 @@ pub enum ReferenceLost {
         /// By so many position units.
         counts: i64,
     },
-    /// It is beyond what the drive's 32 bits can tell apart.
-    #[error(
-        "it has turned beyond the 32 bits of the drive's position since, which tells no turns apart then"
-    )]
-    Overrun,
     /// The encoder's position is not there, or not any more.
     #[error(
         "the drive does not show the position of its encoder, which its own must be compared with"
@@ -105,6 +100,15 @@ pub enum ReferenceLost {
         /// Which object.
         object: Object,
     },
+    /// Nobody has seen yet whether it is the encoder's own position: the origin has not changed.
+    #[error(
+        "the origin lies where it lay, so that nobody could see whether {object} is the encoder's own position; that shows at \
+         the first zero after the drive was without power"
+    )]
+    NotTried {
+        /// Which object.
+        object: Object,
+    },
     /// Nothing can be compared while it moves.
     #[error("the axis moved by {increments} increments while it was read")]
     Moving {
@@ -112,7 +116,9 @@ pub enum ReferenceLost {
         increments: u32,
     },
     /// It found something wrong meanwhile.
-    #[error("the drive reports error {code:#06X}")]
+    #[error(
+        "the drive reports error {code:#06X}; once its cause is gone, switch the drive off and on, and zero"
+    )]
     Fault {
         /// 0x603F.
         code: u32,

@@ -61,9 +61,13 @@ pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError>
 /// What the operating system says.
 pub fn remove_durably(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    // Also where it is gone already: whoever removed it may have died before this.
+    match File::open(path.parent().unwrap_or(Path::new("."))) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error),
-        Ok(()) => File::open(path.parent().unwrap_or(Path::new(".")))?.sync_all(),
+        folder => folder?.sync_all(),
     }
 }
 

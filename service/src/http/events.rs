@@ -43,8 +43,8 @@ pub(super) struct Wanted {
     kinds: Option<String>,
     /// After the event of this number; the header `Last-Event-ID` says the same.
     after: Option<u64>,
-    /// Also a sample of every axis each so many milliseconds, as events `sample` without an id; at most one each tick of
-    /// the machine, which is its SYNC.
+    /// Also a sample of every axis each so many milliseconds, as events `sample` without an id; at most one for each
+    /// state that the machine publishes, which is more than one each SYNC.
     #[param(minimum = 1, maximum = 60000)]
     sample_ms: Option<u64>,
 }

@@ -16,8 +16,6 @@ use units::{Metres, Radians};
 const MARK: &str = "{ by = \"mark\", object = \"0x2F00:02\" }";
 const BIT: &str = "{ by = \"homed_bit\", object = \"0x6041:00\", bit = 15 }";
 const ABSOLUTE: &str = "{ by = \"absolute_encoder\", object = \"0x6063:00\" }";
-/// What counts with the position, also when that is homed.
-const POSITION: &str = "{ by = \"absolute_encoder\", object = \"0x6064:00\" }";
 /// Each count of the stage, and what its servo holds.
 const STANDS: Metres = Metres(50e-9);
 
@@ -237,7 +235,7 @@ fn who_homes_the_drive_behind_our_back_takes_its_zero() {
 
 #[test]
 fn what_is_no_encoder_of_its_own_proves_nothing() {
-    let mut bench = stage(POSITION, "");
+    let mut bench = stage(ABSOLUTE, "increments_are_homed = true");
     again(&mut bench);
     let warned = Rc::new(RefCell::new(Vec::new()));
     bench.machine.observe(Box::new(Warned(Rc::clone(&warned))));
@@ -297,6 +295,46 @@ fn a_fault_that_is_reset_gives_no_zero_back() {
             );
         }
     }
+}
+
+#[test]
+fn a_proof_that_proves_nothing_is_refused() {
+    let refused = |shipped: Shipped, head: &str, proof: &str, says: &str| {
+        let text = shipped
+            .machine
+            .edit(head, &format!("{head}kept_zero = {proof}\n"));
+        let refused = truestage::config::parse(&text, "machine.toml");
+        let told = refused.expect_err("it is refused").to_string();
+        assert!(told.contains(says), "{told}");
+    };
+    let position = "{ by = \"absolute_encoder\", object = \"0x6064:00\" }";
+    let x = "\n[axis.x]\n";
+    refused(
+        tests::LINEAR,
+        x,
+        position,
+        "is not an encoder's own position",
+    );
+    refused(VOLUMETRIC, x, ABSOLUTE, "has no zero of its own");
+    refused(
+        tests::ROTARY,
+        "\n[rotary.c]\n",
+        ABSOLUTE,
+        "homed on its encoder's index mark",
+    );
+    let ready = "{ by = \"homed_bit\", object = \"0x6041:00\", bit = 9 }";
+    refused(tests::LINEAR, x, ready, "means something else in CiA 402");
+    let target = "{ by = \"mark\", object = \"0x607A:00\" }";
+    refused(tests::LINEAR, x, target, "a mark would change it");
+    let counts_on = tests::ROTARY.machine.edit(
+        "position_range = \"to_last_count\"",
+        &format!("kept_zero = {MARK}\nposition_range = \"counts_on\""),
+    );
+    let told = truestage::config::parse(&counts_on, "machine.toml").expect_err("it is refused");
+    assert!(
+        told.to_string().contains("it begins anew within a turn"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -85,20 +85,6 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
                 "lower it, or use a coarser resolution",
             );
         }
-        // Its registers are whole numbers, and nothing moves at 0.
-        let smallest = motion.resolution_nm.abs() * 1e-6 * counts;
-        if let Some(value) = value.filter(|it| (0.0..smallest).contains(it) && *it > 0.0) {
-            judge.say(
-                key,
-                format!(
-                    "{} {unit} are less than one unit of the drive, which is {} {unit} with a resolution of {} nm",
-                    Short(value),
-                    Short(smallest),
-                    Short(motion.resolution_nm)
-                ),
-                "raise it",
-            );
-        }
     }
 }
 

@@ -13,6 +13,7 @@ use serde::Deserialize;
 use units::{Metres, MetresPerSecond, MetresPerSecondCubed, MetresPerSecondSquared};
 
 use super::bus::Wiring;
+use super::kept_zero::KeptZeroConfig;
 use super::node::NodeConfig;
 use crate::config::judge::Judge;
 pub(crate) use cia402::Cia402AxisConfig;
@@ -74,11 +75,11 @@ pub struct Task<'a> {
 }
 
 impl DriveConfig {
-    /// Whether it is to prove at a start that it kept its zero.
-    pub(crate) const fn keeps_zero(&self) -> bool {
+    /// How it proves at a start that it kept its zero.
+    pub(crate) const fn kept_zero(&self) -> Option<&KeptZeroConfig> {
         match self {
-            Self::Cia402(family) => family.kept_zero.is_some(),
-            Self::Copley(_) => false,
+            Self::Cia402(family) => family.kept_zero.as_ref(),
+            Self::Copley(_) => None,
         }
     }
 

@@ -49,7 +49,7 @@ fn check_sides(judge: &mut Judge<'_>, config: &MachineConfig, gantry: &GantryCon
         if config
             .axis
             .get(axis)
-            .is_some_and(|it| it.drive.keeps_zero())
+            .is_some_and(|it| it.drive.kept_zero().is_some())
         {
             judge.say(
                 "axes",

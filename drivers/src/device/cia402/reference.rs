@@ -2,9 +2,10 @@
 
 use units::{Coordinate, Time};
 use wire::canopen::Object;
+use wire::cia402::PowerState;
 
 use super::modulo::apart;
-use super::settings::{Cia402Settings, PositionRange, Turn};
+use super::settings::Cia402Settings;
 use super::start::{HOME_OFFSET, HOMING_METHOD, POSITION_ACTUAL};
 use super::{Activity, Cia402Drive};
 use crate::device::reference::{DriveReference, ReferenceLost, ReferenceProof};
@@ -185,7 +186,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 seen,
             });
         }
-        if is_fault(now.error_code) {
+        // A drive need not have 0x603F.
+        let is_in_fault = matches!(
+            self.state(),
+            Some(PowerState::Fault | PowerState::FaultReactionActive)
+        );
+        if is_fault(now.error_code) || is_in_fault && now.error_code == 0 {
             let code = now.error_code;
             return Err(ReferenceLost::Fault { code });
         }
@@ -208,24 +214,13 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
         let turned = f64::from(after.wrapping_sub(before)) * units;
         let margin = ROUNDING_COUNTS + f64::from(then.moved.saturating_add(now.moved)) * units;
-        let counts_on = matches!(
-            self.settings.turn,
-            Some(Turn {
-                range: PositionRange::CountsOn,
-                ..
-            })
-        );
-        let modulo = self.settings.modulo().filter(|_| !counts_on);
+        let modulo = self.settings.modulo();
         // The encoder counts with or against the axis.
         let expected = [turned, -turned].map(|it| i64::from(then.position) + it.round() as i64);
         let away = expected.map(|it| apart(modulo, i64::from(now.position), it));
         let counts = away.into_iter().min_by_key(|it| it.abs()).unwrap_or(0);
-        if counts.abs() as f64 <= margin {
-            return Ok(());
-        }
-        let is_beyond = |it: &i64| i32::try_from(*it).is_err();
-        match counts_on && expected.iter().any(is_beyond) {
-            true => Err(ReferenceLost::Overrun),
+        match counts.abs() as f64 <= margin {
+            true => Ok(()),
             false => Err(ReferenceLost::Shifted { counts }),
         }
     }
@@ -236,14 +231,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return Ok(());
         };
         let (Some(before), Some(after)) = (self.before_home, now.increments) else {
-            return Ok(());
+            return Err(ReferenceLost::NotTried { object });
         };
         let moved = f64::from(after.wrapping_sub(before.increments)) * self.units_per_increment();
         let homed = i64::from(now.position) - before.position;
         let tolerance = self.settings.tolerance_counts() as f64;
-        match homed.abs() as f64 > tolerance && moved.abs() > tolerance {
-            true => Err(ReferenceLost::NotOfEncoder { object }),
-            false => Ok(()),
+        match (homed.abs() as f64 > tolerance, moved.abs() > tolerance) {
+            (true, false) => Ok(()),
+            (true, true) => Err(ReferenceLost::NotOfEncoder { object }),
+            (false, _) => Err(ReferenceLost::NotTried { object }),
         }
     }
 

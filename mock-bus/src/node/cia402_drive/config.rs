@@ -71,6 +71,8 @@ pub struct Cia402DriveConfig {
     pub abort_connection_option: i16,
     /// The encoder is absolute and the drive stores its origin: both are there again after a power cycle.
     pub absolute_encoder: bool,
+    /// 0x6063 counts with the position, also when that is homed, as in some drives.
+    pub increments_are_homed: bool,
     /// Bit of the statusword (8, 14 or 15, which CiA 402 leaves to the manufacturer) that is 1 while the drive is homed.
     pub homed_bit: Option<u8>,
     /// It moves a rotary axis: this takes the place of all lengths above.
@@ -211,6 +213,7 @@ impl Default for Cia402DriveConfig {
             quick_stop_option: 6,
             abort_connection_option: 3,
             absolute_encoder: false,
+            increments_are_homed: false,
             homed_bit: None,
             rotary: None,
             touch_probe: None,

@@ -25,9 +25,13 @@ impl Drive {
         let (negative, positive) = m.limit_switches();
         let inputs = i64::from(negative) | i64::from(positive) << 1;
         let interlock = i64::from(self.safe_torque_off) << 3;
+        let increments = match self.config.increments_are_homed {
+            true => actual,
+            false => m.counts() - self.counted_from,
+        };
         let values = [
             (0x6062, self.shown(shown)),
-            (0x6063, m.counts() - self.counted_from),
+            (0x6063, increments),
             (0x6064, self.shown(actual)),
             (0x606B, demand.velocity.round() as i64),
             (0x606C, sign * m.speed().round() as i64),

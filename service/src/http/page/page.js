@@ -337,6 +337,10 @@ function showRun(run) {
     list.append(...asks.map((it) => element("li", it)));
     parts.push(element("p", "A person is asked:"), list);
   }
+  const loads = Object.entries(run.plan.bus_load || {});
+  if (run.state === "planned" && loads.length) {
+    parts.push(element("p", `bus load ${loads.map(([name, share]) => `${name} ${(100 * share).toFixed(0)} %`).join(", ")}`));
+  }
   if (run.state === "planned" && run.plan.departure) {
     const { size, at_s: when, lines } = run.plan.departure;
     parts.push(element("p", `at most ${number(size, 3)} from the straight joins of its rows, at ${when.toFixed(3)} s (lines ${lines.join(" to ")})`));
