@@ -16,6 +16,7 @@ pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
     let mut found = Vec::new();
     check_profiles(config, &mut found);
     check_paths(config, &mut found);
+    check_serial_numbers(config, &mut found);
     check_rates(config, &mut found);
     check_dead_paths(config, &mut found);
     watch_warnings::check(config, &mut found);
@@ -37,6 +38,45 @@ fn check_paths(config: &MachineConfig, found: &mut Vec<Finding>) {
             let cause = format!("{} is that of {other} too", path.display());
             let help = "give each the device that it is plugged into; `/dev/serial/by-id/` has their names";
             Judge::at(key, found).say("path", cause, help);
+        }
+    }
+}
+
+/// Whether each drive is one of its own: a section that was copied has the number of another.
+fn check_serial_numbers(config: &MachineConfig, found: &mut Vec<Finding>) {
+    let axes = config.axis.iter();
+    let axes = axes.map(|(name, it)| {
+        (
+            format!("axis.{name}"),
+            it.drive.family().identity(),
+            it.node().is_some(),
+        )
+    });
+    let tables = config.rotary.iter();
+    let tables = tables.map(|(name, it)| {
+        (
+            format!("rotary.{name}"),
+            it.node.identity.configured(),
+            true,
+        )
+    });
+    let mut taken: BTreeMap<(u32, u32, u32), String> = BTreeMap::new();
+    for (section, identity, is_node) in axes.chain(tables) {
+        if identity.serial == 0 {
+            continue;
+        }
+        let whose = (identity.vendor, identity.product, identity.serial);
+        if let Some(other) = taken.insert(whose, section.clone()) {
+            let key = if is_node {
+                "identity.serial_number"
+            } else {
+                "amplifier.serial_number"
+            };
+            Judge::at(section, found).say(
+                key,
+                format!("{} is the serial number of {other}, too", identity.serial),
+                "no two devices of a kind have the same: `truestage scan` says which is where",
+            );
         }
     }
 }
@@ -158,6 +198,19 @@ mod tests {
         ] {
             check(text, &[], &[], "");
         }
+    }
+
+    #[test]
+    fn two_drives_with_one_serial_number_are_told() {
+        let amplifiers = include_str!("../../../configs/machines/uvw-copley.toml");
+        let edit = ("serial_number = 4002", "serial_number = 4001");
+        let says = "4001 is the serial number of axis.u, too";
+        check(
+            amplifiers,
+            &[edit],
+            &["axis.v.amplifier.serial_number"],
+            says,
+        );
     }
 
     #[test]

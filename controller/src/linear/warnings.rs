@@ -227,6 +227,8 @@ fn check_corrections(
 
 #[cfg(test)]
 mod tests {
+    use crate::Edit;
+    use crate::config::parse;
     use crate::config::warnings::told::check;
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
@@ -243,6 +245,25 @@ mod tests {
         );
         let says = "3 µm beside its target, and accuracy_tolerance_um is 2";
         check(LINEAR, &[(from, "position_window_um = 3.0")], &[key], says);
+    }
+
+    #[test]
+    fn less_than_one_unit_of_the_drive_is_told() {
+        let text = LINEAR
+            .edit_first("resolution_nm = 10.0", "resolution_nm = 100000.0")
+            .edit_first(
+                "acceleration_mm_per_s2 = 5000.0",
+                "acceleration_mm_per_s2 = 0.05",
+            );
+        let loaded = parse(&text, "m.toml").unwrap_or_else(|error| panic!("{error}"));
+        let key = "axis.x.acceleration_mm_per_s2";
+        let told = loaded.warnings.iter().find(|it| it.key == key);
+        let told = told.unwrap_or_else(|| panic!("{:#?}", loaded.warnings));
+        assert!(
+            told.cause.contains("and it takes 0.1 mm/s²"),
+            "{}",
+            told.cause
+        );
     }
 
     #[test]

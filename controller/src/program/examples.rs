@@ -146,8 +146,17 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "truestage fit volumetric lines.csv --config volumetric.toml --without e_cz,e_az --save",
         ],
     ),
-    ("plan rotary", &["truestage plan rotary --lines 36"]),
-    ("plan screw", &["truestage plan screw --lead-mm 1"]),
+    (
+        "plan rotary",
+        &[
+            "truestage plan rotary --lines 36 --placements 3",
+            "truestage plan rotary --lines 36 --offsets 0,1,8,26",
+        ],
+    ),
+    (
+        "plan screw",
+        &["truestage plan screw --lead-mm 1 --first-mm -4 --last-mm 4"],
+    ),
     (
         "plan zero",
         &[

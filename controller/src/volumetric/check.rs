@@ -68,7 +68,8 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
         }
     }
     if let Err(error) = settings::volumetric_chain(volumetric) {
-        judge.say("chain", error.to_string(), "");
+        let help = "name the foundation F, and X, Y and Z once each, from the workpiece to the tool, such as \"FXYZ\"";
+        judge.say("chain", error.to_string(), help);
     }
 }
 

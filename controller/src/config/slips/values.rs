@@ -37,7 +37,14 @@ fn decimal_comma(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     }
     let meant = format!("{whole}.{part}");
     let cause = format!("`{}` has a comma", shown(value));
-    let help = format!("write a point before the decimals: {meant}");
+    // `5,000` may be five thousand.
+    let thousands = (1..=3).contains(&digits.len()) && !digits.starts_with('0') && part.len() == 3;
+    let help = match thousands {
+        false => format!("write a point before the decimals: {meant}"),
+        true => format!(
+            "write a point before the decimals: {meant}; where the comma parts thousands: {whole}{part}"
+        ),
+    };
     parts.value_meant(&meant, cause, help)
 }
 
@@ -104,6 +111,9 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     parts.value_meant(&meant, cause, help)
 }
 
+/// Numbers of an identity (CiA 301, 0x1018) are written with eight digits, seldom with fewer than five.
+const IDENTITY_DIGITS: usize = 5;
+
 /// `0X1F`, `1Fh`, `$1F` and the like.
 fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let marked = value.strip_prefix("0X").or_else(|| value.strip_prefix('$'));
@@ -118,7 +128,9 @@ fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let is_unit = marked.is_none() && letters == 0 && !digits.starts_with('0');
     let is_digits = digits.starts_with(|it: char| marked.is_some() || it.is_ascii_digit())
         && digits.chars().all(|it| it.is_ascii_hexdigit());
-    if !is_digits || !is_number || is_unit {
+    // `010` is ten with a zero before it; so many digits are an identity's.
+    let is_decimal = digits.len() == value.len() && letters == 0 && digits.len() < IDENTITY_DIGITS;
+    if !is_digits || !is_number || is_unit || is_decimal {
         return None;
     }
     let meant = format!("0x{digits}");

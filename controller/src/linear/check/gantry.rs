@@ -45,6 +45,17 @@ fn check_sides(judge: &mut Judge<'_>, config: &MachineConfig, gantry: &GantryCon
             "name the axis of each side",
         );
     }
+    let sensors = |axis: &String| Some(&config.axis.get(axis)?.zero.as_ref()?.analog);
+    if let (Some(own), Some(other)) = (sensors(first), sensors(second))
+        && own == other
+        && first != second
+    {
+        judge.say(
+            "axes",
+            format!("`{first}` and `{second}` have both their zero by `{own}`, and each side has Hall sensors of its own"),
+            format!("look at `analog` of [axis.{first}.zero] and [axis.{second}.zero]"),
+        );
+    }
     for axis in &gantry.axes {
         if config
             .axis
