@@ -80,6 +80,16 @@ fn read(
     }
 }
 
+/// Why a drive proves nothing now.
+#[derive(Debug, thiserror::Error)]
+enum Unproved {
+    /// It could not be asked.
+    #[error("{0}")]
+    Unread(String),
+    #[error(transparent)]
+    Lost(#[from] ReferenceLost),
+}
+
 /// The longest that some dozen SDO transfers may take.
 const LIMIT: Duration = Duration::from_secs(2);
 
@@ -93,11 +103,11 @@ fn read_at_rest<R>(
     at: usize,
     mark: Option<u32>,
     judge: impl Fn(&mut dyn ServoDrive) -> Result<R, ReferenceLost>,
-) -> Result<Result<Result<R, ReferenceLost>, String>, Failure> {
+) -> Result<Result<R, Unproved>, Failure> {
     let mut readings = READINGS;
     loop {
         if let Err(why) = read(machine, at, mark)? {
-            return Ok(Err(why));
+            return Ok(Err(Unproved::Unread(why)));
         }
         readings -= 1;
         match judge(machine.devices.drive_mut(at)) {
@@ -105,7 +115,7 @@ fn read_at_rest<R>(
                 let until = machine.now() + SETTLING;
                 machine.run_until(until)?;
             }
-            judged => return Ok(Ok(judged)),
+            judged => return Ok(judged.map_err(Unproved::from)),
         }
     }
 }
@@ -114,9 +124,8 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
     let axis = machine.devices.name(at);
     let mark = Some(unlike_any_other(&axis));
     let shown = match read_at_rest(machine, at, mark, |drive| drive.reference())? {
-        Ok(Ok(shown)) => shown,
-        Ok(Err(why)) => return Ok(Err(why.to_string())),
-        Err(why) => return Ok(Err(why)),
+        Ok(shown) => shown,
+        Err(why) => return Ok(Err(why.to_string())),
     };
     let Some(kept) = &machine.kept_zeros else {
         return Ok(Ok(()));
@@ -215,15 +224,18 @@ fn still_holds(machine: &mut Machine, at: usize, note: &Note) -> Result<Holds, F
     }
     let then = note.reference();
     let judged = read_at_rest(machine, at, None, |drive| drive.take_up_reference(&then))?;
-    Ok(match judged {
-        Ok(Ok(())) => Holds::Yes,
-        Ok(Err(why @ (ReferenceLost::Moving { .. } | ReferenceLost::NoEncoder))) => {
-            Holds::Unread(why.to_string())
+    let Err(why) = judged else {
+        return Ok(Holds::Yes);
+    };
+    let said = why.to_string();
+    Ok(match why {
+        Unproved::Unread(_)
+        | Unproved::Lost(ReferenceLost::Moving { .. } | ReferenceLost::NoEncoder) => {
+            Holds::Unread(said)
         }
         // The object holds what another has written.
-        Ok(Err(why @ ReferenceLost::Mark { .. })) => Holds::No(why.to_string()),
-        Ok(Err(why)) => Holds::Refuted(why.to_string()),
-        Err(why) => Holds::Unread(why),
+        Unproved::Lost(ReferenceLost::Mark { .. }) => Holds::No(said),
+        Unproved::Lost(_) => Holds::Refuted(said),
     })
 }
 

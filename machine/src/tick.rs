@@ -8,6 +8,7 @@ use drivers::device::Alarm;
 use drivers::transport::SendError;
 use units::Time;
 use wire::can::{BusError, BusErrorClass, ControllerProblem};
+use wire::canopen::emcy::Emergency;
 use wire::{Arrival, Input, LinkState, Payload, Port};
 
 use crate::failure::Failure;
@@ -234,7 +235,7 @@ const fn takes_reference(alarm: &Alarm) -> bool {
         | Alarm::DuplicateNode { .. }
         | Alarm::AmplifierRestarted { .. }
         | Alarm::PositionJump { .. } => true,
-        Alarm::Emergency { emergency, .. } => emergency.code.0 & 0xFF00 == SENSOR,
+        Alarm::Emergency { emergency, .. } => class_of(emergency) == SENSOR,
         _ => false,
     }
 }
@@ -248,7 +249,12 @@ const fn is_of_communication(alarm: &Alarm) -> bool {
         | Alarm::UnexpectedNmtState { .. }
         | Alarm::PdoLost { .. }
         | Alarm::PdoTooShort { .. } => true,
-        Alarm::Emergency { emergency, .. } => emergency.code.0 & 0xFF00 == COMMUNICATION,
+        Alarm::Emergency { emergency, .. } => class_of(emergency) == COMMUNICATION,
         _ => false,
     }
+}
+
+/// What sort of error it is: the upper half of its code (CiA 301, table 26).
+const fn class_of(emergency: &Emergency) -> u16 {
+    emergency.code.0 & 0xFF00
 }
