@@ -120,6 +120,8 @@ pub(crate) struct Keeper {
     output: Input<Snapshot>,
     ticks: u64,
     figures: Book,
+    /// What the devices counted, some ticks ago.
+    counters: Arc<Vec<(String, &'static str, u64)>>,
     /// Who says what motions gave.
     teller: Option<Teller>,
 }
@@ -148,6 +150,7 @@ impl Keeper {
             output,
             ticks: 0,
             figures: Book::default(),
+            counters: Arc::default(),
             teller,
         }
     }

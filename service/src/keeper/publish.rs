@@ -32,6 +32,10 @@ impl Keeper {
         let runs = self.runs.list();
         let events = self.events.list();
         let figures = self.figures.look(machine);
+        // Kept here, as each buffer below is written in its own turn: they would disagree, and count backwards.
+        if self.ticks % COUNTERS_EVERY == 1 || self.counters.is_empty() {
+            self.counters = Arc::new(machine.devices().counters());
+        }
         // What is there is of some earlier tick: everything is written over.
         let snapshot = self.output.input_buffer_mut();
         snapshot.now = now;
@@ -44,9 +48,7 @@ impl Keeper {
         snapshot.runs = runs;
         snapshot.events = events;
         snapshot.lease = lease;
-        if self.ticks % COUNTERS_EVERY == 1 || snapshot.counters.is_empty() {
-            snapshot.counters = Arc::new(machine.devices().counters());
-        }
+        snapshot.counters = Arc::clone(&self.counters);
         snapshot.figures = figures;
         snapshot.ticks = self.ticks;
         self.output.publish();
