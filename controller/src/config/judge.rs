@@ -81,7 +81,10 @@ impl<'a> Judge<'a> {
                 true => "there is none yet: add a section for it".to_owned(),
                 false => format!("known: {}", names.join(", ")),
             };
-            let help = match word_meant(name, &names) {
+            // `analog.hall` is how its section is called.
+            let (_, last) = name.rsplit_once('.').unwrap_or(("", name));
+            let own = names.iter().find(|it| **it == last).copied();
+            let help = match own.or_else(|| word_meant(name, &names)) {
                 Some(meant) => format!("did you mean `{meant}`? {}", capital(&known)),
                 None => known,
             };

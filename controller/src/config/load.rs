@@ -12,10 +12,10 @@ use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
 use super::model::MachineConfig;
-use super::place::span_of;
+use super::place::{Part, span_of};
 use super::repair::{Repair, repaired};
 use super::schema;
-use super::structure::{self, Part};
+use super::structure::{self, Unread};
 use super::syntax::{self, Recovered};
 use super::validate::{Finding, validate};
 use super::warnings;
@@ -162,15 +162,22 @@ fn read_by<C: DeserializeOwned>(
     let (document, recovered) = match text.parse::<Table>() {
         Ok(document) => (document, Recovered::of(text)),
         Err(error) => {
-            let recovered = syntax::recovered(text, file);
+            let recovered = syntax::recovered(text, file, schema);
             match recovered.text.parse::<Table>() {
                 Ok(document) => (document, recovered),
                 Err(_) => return Err(unreadable(text, file, &error)),
             }
         }
     };
-    let found = structure::judge(&document, schema, &recovered.unread);
+    let (document, quoted) = structure::unquoted(document, schema);
+    let unread = Unread {
+        keys: &recovered.unread,
+        cut_short: &recovered.cut_short,
+        a_section: recovered.has_lost_heading,
+    };
+    let found = structure::judge((&document, &recovered.text), schema, unread);
     let (mut findings, repairs) = (found.findings, found.repairs);
+    findings.extend(quoted);
     let config = Value::Table(repaired(document, &repairs)).try_into::<C>();
     let is_sound = findings.is_empty() && recovered.findings.is_empty();
     let config = match config {
@@ -184,7 +191,7 @@ fn read_by<C: DeserializeOwned>(
         .chain(repairs.iter().flat_map(Repair::doubted))
         .collect();
     // By a value that cannot be read nothing else can be judged, not even by what it is when it is not there.
-    let is_whole = recovered.unread.is_empty();
+    let is_whole = recovered.unread.is_empty() && !recovered.has_lost_heading;
     for finding in config.iter().filter(|_| is_whole).flat_map(judge) {
         // What is impossible by itself is told once, and not again of the section around it.
         if !told.iter().any(|key| is_within(key, &finding.key)) {

@@ -31,6 +31,7 @@ mod structure;
 mod syntax;
 mod unit;
 pub(crate) mod validate;
+mod wanted;
 pub(crate) mod warnings;
 mod watch_warnings;
 mod whole;

@@ -3,7 +3,16 @@
 use core::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-use super::structure::Part;
+/// What is wrong with a key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// That it is there.
+    Name,
+    /// What it says.
+    Value,
+    /// How much it says: the file can be read, and judged further.
+    Size,
+}
 
 /// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it
 /// is absent.
@@ -13,6 +22,13 @@ pub(super) fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>>
     let mut span = None;
     // `actuator[0]` is `actuator.0`.
     let mut parts = key.split(['.', '[', ']']).filter(|it| !it.is_empty());
+    // `["axis.x"]` is one name with a point in it.
+    if let Some((name, _)) = table
+        .iter()
+        .find(|(name, _)| name.get_ref().contains('.') && name.get_ref() == key)
+    {
+        return Some(name.span());
+    }
     while let Some(own) = parts.next() {
         let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
             break;

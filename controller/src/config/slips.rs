@@ -1,6 +1,9 @@
 //! A line that is no TOML: what is wrong with it in the words of whoever wrote it, and the line as it was meant.
 
 mod characters;
+pub(super) mod headings;
+pub(super) mod informed;
+mod loosely;
 mod values;
 
 use toml::Table;
@@ -18,6 +21,14 @@ pub(super) struct Slip {
     pub(super) meant: Option<String>,
     /// Whether it was taken for a text without quotes, which may have been meant to be something else.
     pub(super) is_text: bool,
+    /// Whether it can be meant in two ways, both of which are told.
+    pub(super) is_ambiguous: bool,
+    /// Whether it is a remark that does not begin as one.
+    pub(super) is_comment: bool,
+    /// Whether it begins a section of which the name cannot be read.
+    pub(super) is_lost_heading: bool,
+    /// The key that it is about, where the line does not tell it.
+    pub(super) key: Option<String>,
 }
 
 impl Slip {
@@ -28,6 +39,10 @@ impl Slip {
             help,
             meant,
             is_text: false,
+            is_ambiguous: false,
+            is_comment: false,
+            is_lost_heading: false,
+            key: None,
         }
     }
 }
@@ -40,14 +55,19 @@ pub(super) fn of_line(line: &str, at: usize) -> Slip {
         .or_else(|| two_keys(&parts))
         .or_else(|| comment(&parts))
         .or_else(|| characters::look_alike(&parts))
-        .or_else(|| heading(&parts))
+        .or_else(|| headings::of_line(&parts))
         .or_else(|| equals(&parts))
         .or_else(|| values::of(&parts))
-        .unwrap_or_else(|| {
-            let cause = format!("`{}` cannot be read", shown(parts.said.trim()));
-            let help = "a line is `key = value`, `[section]`, or a comment after #";
-            Slip::new(at, cause, help.into(), None)
+        .unwrap_or_else(|| Slip {
+            at,
+            ..nothing_known(&parts)
         })
+}
+
+fn nothing_known(parts: &Parts<'_>) -> Slip {
+    let cause = format!("`{}` cannot be read", shown(parts.said.trim()));
+    let help = "remove it, or begin it with #; a line is `key = value`, `[section]`, or a comment";
+    Slip::new(0, cause, help.into(), None)
 }
 
 /// What a value that goes on over further lines ends with.
@@ -204,38 +224,11 @@ fn comment(parts: &Parts<'_>) -> Option<Slip> {
 
 fn no_comment(sign: &str, at: usize, meant: String) -> Slip {
     let cause = format!("`{}` begins no comment here", sign.trim());
-    Slip::new(at, cause, "begin it with #".into(), Some(meant))
-}
-
-/// The name of a section whose brackets are not as they must be.
-fn heading(parts: &Parts<'_>) -> Option<Slip> {
-    let line = parts.said.trim();
-    let begins = line.starts_with(['[', '(', '{', '<']);
-    let ends = line.ends_with([']', ')', '}', '>']);
-    if parts.value.is_some() || !(begins || ends) {
-        return None;
+    let is_comment = meant.is_empty();
+    Slip {
+        is_comment,
+        ..Slip::new(at, cause, "begin it with #".into(), Some(meant))
     }
-    let inner = line.trim_start_matches(['[', '(', '{', '<']);
-    let name = inner.split([']', ')', '}', '>']).next().unwrap_or_default();
-    let words = name.split([' ', '/', '\\']).filter(|it| !it.is_empty());
-    let name = words.collect::<Vec<_>>().join(".");
-    let is_list = line.starts_with("[[") || (!line.starts_with('[') && line.ends_with("]]"));
-    let meant = match is_list {
-        true => format!("[[{name}]]"),
-        false => format!("[{name}]"),
-    };
-    let is_name = |it: char| it.is_ascii_alphanumeric() || "_-.".contains(it);
-    if name.is_empty() || !name.chars().all(is_name) || !is_toml(&meant) {
-        return None;
-    }
-    let cause = format!("`{}` names no section", shown(line));
-    let help =
-        format!("write `{meant}`: a section's name stands in brackets, its parts with points");
-    let at = parts.said.len() - parts.said.trim_start().len();
-    // Words in other brackets may be a remark: what follows stays where it is.
-    let is_remark = !line.starts_with('[') && line.contains(' ');
-    let meant = Some(meant).filter(|_| !is_remark);
-    Some(Slip::new(at, cause, help, meant))
 }
 
 /// A second key begins where the line should end.
@@ -279,7 +272,8 @@ fn equals(parts: &Parts<'_>) -> Option<Slip> {
     }
     if value.is_empty() {
         let help = format!("write a value behind it, or remove `{}`", shown(parts.key));
-        return told(0, "there is no value behind the `=`", help, None);
+        let at = parts.said.trim_end().len();
+        return told(at, "there is no value behind the `=`", help, None);
     }
     let key = parts.key.trim_end_matches([':', '-', '<', '=']).trim_end();
     let rest = value.trim_start_matches(['=', '>', ' ']);

@@ -1,9 +1,12 @@
 //! Whether a file has the keys, types and ranges that its schema says.
 
+mod named;
 mod places;
 mod section;
 mod unknown;
 mod written;
+
+use core::ops::Range;
 
 use serde_json::Value as Schema;
 use toml::{Table, Value};
@@ -13,35 +16,39 @@ use super::diagnostic::shown;
 use super::judge::Finding;
 use super::lines::below;
 use super::meant::word_meant;
-use super::repair::Repair;
+use super::place::{Part, span_of};
+use super::repair::{Repair, join};
 use super::schema::{DEVICE, type_of, without_null};
+use named::named;
 use section::Section;
-use unknown::{is_part_of_one, merged, unknown, without_name};
+use unknown::{merged, orphans, tell_orphans, unknown};
 use written::{converted, correction, in_words, kind};
-
-/// What is wrong with a key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// That it is there.
-    Name,
-    /// What it says.
-    Value,
-    /// How much it says: the file can be read, and judged further.
-    Size,
-}
 
 /// What was found, by keys, and which part of each it is.
 type Findings = Vec<(Finding, Part)>;
+
+/// What is there and cannot be read: it is not missing.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Unread<'a> {
+    pub(super) keys: &'a [String],
+    /// Sections whose last lines cannot be read.
+    pub(super) cut_short: &'a [String],
+    /// Whether there is a section of which nobody knows which it is.
+    pub(super) a_section: bool,
+}
 
 /// What is told of a file.
 pub(super) struct Found<'a> {
     pub(super) findings: Findings,
     /// What makes a file that can be read all the same of it, as far as that can be told.
     pub(super) repairs: Vec<Repair>,
-    /// Keys that are there and cannot be read.
-    unread: &'a [String],
+    unread: Unread<'a>,
     schema: &'a Schema,
-    /// The sections that are being judged, from the outermost on, with their keys.
+    /// The file as it stands.
+    text: &'a str,
+    /// Whether keys stand in a section that lacks its name: what is missing may be theirs.
+    has_nameless: bool,
+    /// The sections that are being judged, from the outermost on, with the keys that they could still have.
     above: Vec<(String, Vec<String>)>,
 }
 
@@ -50,6 +57,16 @@ impl Found<'_> {
         let key = key.to_owned();
         self.repairs
             .extend(value.map(|value| Repair::Replace { key, value }));
+    }
+
+    /// Where that part of a key stands.
+    fn written(&self, key: &str, part: Part) -> Option<Range<usize>> {
+        span_of(self.text, key, part)
+    }
+
+    /// A value as it stands in the file.
+    fn as_written(&self, key: &str) -> Option<&str> {
+        self.text.get(self.written(key, Part::Value)?)
     }
 
     /// The section around this one that has such a key, and the one that has it wherever it is.
@@ -68,17 +85,69 @@ impl Found<'_> {
     }
 }
 
-/// All that is not as `schema` says; `unread` are keys that are there and cannot be read.
-pub(super) fn judge<'a>(document: &Table, schema: &'a Schema, unread: &'a [String]) -> Found<'a> {
+/// All that is not as `schema` says.
+pub(super) fn judge<'a>(
+    (document, text): (&Table, &'a str),
+    schema: &'a Schema,
+    unread: Unread<'a>,
+) -> Found<'a> {
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
         unread,
         schema,
+        text,
+        has_nameless: false,
         above: Vec::new(),
     };
     table("", document, schema, &mut found);
     found
+}
+
+/// Whether a value can be what `schema` says.
+pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
+    let mut found = Found {
+        findings: Vec::new(),
+        repairs: Vec::new(),
+        unread: Unread::default(),
+        schema,
+        text: "",
+        has_nameless: false,
+        above: Vec::new(),
+    };
+    any("", value, schema, &mut found);
+    found.findings.is_empty()
+}
+
+/// `["axis.x"]` is one name with a point in it: such sections are put where they were meant to be.
+pub(super) fn unquoted(document: Table, schema: &Schema) -> (Table, Findings) {
+    let is_meant = |name: &str, value: &Value| {
+        let first = name.split_once('.').map(|it| it.0);
+        value.is_table() && first.is_some_and(|it| schema["properties"].get(it).is_some())
+    };
+    let (quoted, mut document): (Table, Table) = document
+        .into_iter()
+        .partition(|(name, value)| is_meant(name, value));
+    let mut findings = Findings::new();
+    for (name, value) in quoted {
+        let nested = name.rsplit('.').fold(value, |inner, part| {
+            let mut table = Table::new();
+            table.insert(part.to_owned(), inner);
+            Value::Table(table)
+        });
+        if let Value::Table(nested) = nested {
+            join(&mut document, nested);
+        }
+        let cause = "the quotation marks make one name of it".to_owned();
+        let help = format!("write `[{name}]`");
+        let finding = Finding {
+            key: name,
+            cause,
+            help,
+        };
+        findings.push((finding, Part::Name));
+    }
+    (document, findings)
 }
 
 fn say(found: &mut Found<'_>, key: &str, cause: String, help: String) {
@@ -116,7 +185,14 @@ fn any(path: &str, value: &Value, schema: &Schema, found: &mut Found<'_>) {
         (expected, _) => {
             let cause = format!("expected {} here, this is {seen}", in_words(expected));
             found.replace(path, converted(expected, value));
-            say(found, path, cause, correction(expected, value));
+            let written = found.as_written(path).unwrap_or_default();
+            let help = match (expected, value) {
+                ("object", Value::Array(items)) if items.iter().all(Value::is_table) => {
+                    format!("write `[{path}]`, once")
+                }
+                _ => correction(expected, value, written),
+            };
+            say(found, path, cause, help);
         }
     }
 }
@@ -135,24 +211,19 @@ fn fitting<'a>(schema: &'a Schema, value: &Value) -> &'a Schema {
 
 fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     if schema["properties"].is_null() {
-        // Named by the user, all alike.
-        let own = &schema["additionalProperties"];
-        for (key, value) in seen {
-            match value {
-                Value::Table(inner) if is_part_of_one(key, inner, own) => {
-                    without_name(path, key, seen, found);
-                }
-                _ => any(&below(path, key), value, own, found),
-            }
-        }
-        return;
+        return named(path, seen, &schema["additionalProperties"], found);
     }
     let section = Section::of(schema, seen);
     let merged = merged(seen, &section);
-    let names = section.keys.keys().map(|it| (*it).to_owned());
-    found.above.push((path.to_owned(), names.collect()));
     let keys = section.keys.keys().copied();
     let free: Vec<&str> = keys.filter(|it| !seen.contains_key(*it)).collect();
+    let names = free.iter().map(|it| (*it).to_owned());
+    found.above.push((path.to_owned(), names.collect()));
+    let orphans = orphans((path, seen), &section, &free, found.schema);
+    let orphans = orphans.filter(|(keys, _)| keys.iter().all(|it| found.home_of(it).is_none()));
+    if let Some((keys, home)) = &orphans {
+        tell_orphans(path, keys, home, found);
+    }
     let mut mistyped = Vec::new();
     for (key, value) in seen {
         match section.keys.get(key.as_str()) {
@@ -160,26 +231,36 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
                 let value = merged.get(key).unwrap_or(value);
                 any(&below(path, key), value, own, found);
             }
+            None if orphans
+                .as_ref()
+                .is_some_and(|it| it.0.contains(&key.as_str())) => {}
             None => mistyped.extend(unknown((path, key), value, &section, &free, found)),
         }
     }
     // What was only mistyped, or cannot be read, is told once.
     let missed = section.required.iter();
-    let missed = missed.filter(|it| free.contains(it) && !mistyped.contains(it));
+    let is_whole = !found.unread.cut_short.iter().any(|it| it == path);
+    let missed = missed.filter(|it| is_whole && free.contains(it) && !mistyped.contains(it));
     for key in missed {
-        if !found.unread.contains(&below(path, key)) {
+        let is_told = orphans.as_ref().is_some_and(|it| it.1 == below(path, key));
+        let is_lost = is_told
+            || (found.unread.a_section || found.has_nameless)
+                && is_section(key, section.keys[*key]);
+        if !is_lost && !found.unread.keys.contains(&below(path, key)) {
             missing(path, key, section.keys[*key], found);
         }
     }
     found.above.pop();
 }
 
+fn is_section(key: &str, schema: &Schema) -> bool {
+    type_of(without_null(schema)) == "object" && names(schema).is_none() && key != DEVICE
+}
+
 fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
-    let what = match type_of(without_null(schema)) {
-        "object" if names(schema).is_none() && key != DEVICE => {
-            format!("the section `{}`", below(path, key))
-        }
-        _ => format!("`{key}`"),
+    let what = match is_section(key, schema) {
+        true => format!("the section `{}`", below(path, key)),
+        false => format!("`{key}`"),
     };
     let help = format!("add {what}; configs/README.md describes every key");
     say(found, path, format!("missing {what}"), help);
@@ -206,7 +287,7 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
                 count => format!("{count} entries"),
             },
             match has_commas(items, least) {
-                true => format!("give {wanted}, with a point before the decimals: 1.5"),
+                true => with_points(found.as_written(path).unwrap_or_default()),
                 false => format!("give {wanted}"),
             },
         );
@@ -232,6 +313,15 @@ fn has_commas(items: &[Value], wanted: Option<u64>) -> bool {
     let is_whole = |it: &Value| it.is_integer() || it.is_float();
     let is_twice = wanted.is_some_and(|it| it > 0 && items.len() as u64 == 2 * it);
     is_twice && items.iter().all(is_whole)
+}
+
+/// `[0,5, 1,5]` as it was meant.
+fn with_points(list: &str) -> String {
+    let inner = list.trim_matches(['[', ']', ' ']);
+    let numbers: Vec<&str> = inner.split(',').map(str::trim).collect();
+    let pairs = numbers.chunks(2).map(|it| it.join("."));
+    let list = pairs.collect::<Vec<_>>().join(", ");
+    format!("write a point before the decimals: [{list}]")
 }
 
 fn figure(value: &Value) -> Option<f64> {

@@ -5,11 +5,13 @@ mod twice;
 
 use std::collections::BTreeMap;
 
+use serde_json::Value as Schema;
 use toml::de::DeTable;
 
 use super::diagnostic::{Diagnostic, shown};
 use super::lines::below;
-use super::slips::{self, End, Slip, goes_on, is_toml};
+use super::slips::{self, End, Slip, goes_on, headings, informed, is_toml};
+use super::wanted::Wanted;
 
 /// So many lines are told one by one; a file with more is hardly a configuration.
 const TOLD_MAX: usize = 25;
@@ -24,6 +26,10 @@ pub(super) struct Recovered {
     pub(super) unread: Vec<String>,
     /// Keys that are sections elsewhere, or the other way round: nothing more is said of them.
     pub(super) contested: Vec<String>,
+    /// Sections whose last lines cannot be read.
+    pub(super) cut_short: Vec<String>,
+    /// Whether a section is there whose name cannot be read.
+    pub(super) has_lost_heading: bool,
     /// Lines whose value was taken for a text without quotes.
     pub(super) taken_for_text: Vec<usize>,
 }
@@ -38,8 +44,45 @@ impl Recovered {
     }
 }
 
-/// What can be read of `text`; `file` is its name in findings.
-pub(super) fn recovered(text: &str, file: &str) -> Recovered {
+impl Recovered {
+    /// What is wrong with the line, which is the `number`th.
+    fn note(&mut self, slip: &Slip, section: &Section, (line, number): (&str, usize), file: &str) {
+        let read = slip.meant.as_deref().filter(|it| it.contains('='));
+        let key = match &slip.key {
+            Some(key) => below(&section.path, key),
+            None => section.key(read.unwrap_or(line)),
+        };
+        if slip.meant.is_none() && !key.is_empty() {
+            self.unread.push(key.clone());
+        }
+        self.has_lost_heading |= slip.is_lost_heading;
+        if slip.is_lost_heading && slip.meant.is_some() {
+            self.cut_short.push(section.path.clone());
+        }
+        if slip.is_text {
+            self.taken_for_text.push(number);
+        }
+        self.findings.push(Diagnostic {
+            file: file.to_owned(),
+            line: number,
+            column: line[..slip.at.min(line.len())].chars().count() + 1,
+            key,
+            cause: slip.cause.clone(),
+            help: slip.help.clone(),
+        });
+    }
+}
+
+/// How many lines are of a section whose name cannot be read.
+fn lost(lines: &[&str]) -> usize {
+    let next = lines
+        .iter()
+        .position(|it| it.trim_start().starts_with('[') && is_header(it));
+    next.unwrap_or(lines.len())
+}
+
+/// What can be read of `text`; `file` is its name in findings, `schema` what it should be.
+pub(super) fn recovered(text: &str, file: &str, schema: &Schema) -> Recovered {
     let mut found = Recovered::default();
     let lines = text.split('\n');
     let lines: Vec<&str> = lines
@@ -55,30 +98,27 @@ pub(super) fn recovered(text: &str, file: &str) -> Recovered {
             true => {
                 section.enter(line);
                 kept.extend(lines[at..at + count].iter().map(|it| (*it).to_owned()));
+                at += count;
             }
             false => {
-                let slip = slip(line, &whole, count);
-                section.enter(slip.meant.as_deref().unwrap_or_default());
-                let key = section.key(line);
-                if slip.meant.is_none() && !key.is_empty() {
-                    found.unread.push(key.clone());
-                }
-                if slip.is_text {
-                    found.taken_for_text.push(at + 1);
-                }
-                found.findings.push(Diagnostic {
-                    file: file.to_owned(),
-                    line: at + 1,
-                    column: line[..slip.at.min(line.len())].chars().count() + 1,
-                    key,
-                    cause: slip.cause,
-                    help: slip.help,
-                });
-                kept.push(slip.meant.unwrap_or_default());
+                let wanted = Wanted::at(schema, &section.path);
+                let next = lines.get(at + 1).filter(|_| count == 1);
+                let joined = next.and_then(|it| informed::of_two_lines(line, it, &wanted));
+                let count = if joined.is_some() { 2 } else { count };
+                let slip = joined.unwrap_or_else(|| slip(line, &whole, count, (schema, &wanted)));
+                let meant = slip.meant.clone().unwrap_or_default();
+                section.enter(&meant);
+                found.note(&slip, &section, (line, at + 1), file);
+                kept.push(meant);
                 kept.extend((1..count).map(|_| String::new()));
+                at += count;
+                if slip.is_lost_heading {
+                    let lost = lost(&lines[at..]);
+                    kept.extend((0..lost).map(|_| String::new()));
+                    at += lost;
+                }
             }
         }
-        at += count;
     }
     twice::take_out(&mut kept, file, &mut found);
     found.text = kept.join("\n");
@@ -121,12 +161,15 @@ fn begins(line: &str) -> bool {
 }
 
 /// What is wrong with a line, or with what goes on over `count` lines.
-fn slip(line: &str, whole: &str, count: usize) -> Slip {
+fn slip(line: &str, whole: &str, count: usize, (schema, wanted): (&Schema, &Wanted<'_>)) -> Slip {
     let place = DeTable::parse(whole).err().and_then(|it| it.span());
     let at = place.map_or(0, |it| it.start);
+    let informed = || informed::of_line(line, at, wanted);
+    let is_taken = |it: &Slip| it.meant.as_deref().is_some_and(|it| wanted.takes(it));
     match goes_on(line) {
+        Some(_) if count == 1 && is_taken(&informed()) => informed(),
         Some(end) => slips::of_lines(line, whole, end, count),
-        None => slips::of_line(line, at),
+        None => headings::of_schema(line, schema).unwrap_or_else(informed),
     }
 }
 

@@ -32,12 +32,99 @@ pub(super) fn is_unit(text: &str) -> bool {
         && text.starts_with(['x', 'o', 'b'])
         && text[1..].starts_with(|it: char| it.is_ascii_hexdigit());
     let is_rest = |it: char| it.is_alphanumeric() || "/°²³%″′^".contains(it);
-    begins && !is_prefix && text.chars().all(is_rest)
+    // A letter that looks like a digit is one; digits are exponents.
+    let is_digit = ["l", "I", "O", "o"].contains(&text);
+    let digits = text.matches(|it: char| it.is_ascii_digit() && !"23".contains(it));
+    begins && !is_prefix && !is_digit && digits.count() == 0 && text.chars().all(is_rest)
+}
+
+/// `number` of `unit` in the unit that `key` ends with: 0.05 mm are 50.0 of `position_window_um`.
+pub(super) fn converted(number: &str, unit: &str, key: &str) -> Option<String> {
+    let unit = unit.replace('²', "2").replace('³', "3").replace('^', "");
+    let written = size(&unit)?;
+    let wanted = unit_of(key)?;
+    if written.0 != wanted.0 {
+        return None;
+    }
+    let value = number.parse::<f64>().ok()? * written.1 / wanted.1;
+    // Without what the factors leave behind the last digit.
+    let value: f64 = format!("{value:.11e}").parse().ok()?;
+    Some(format!("{value:?}"))
+}
+
+/// The unit that a key ends with. Temperatures are none: they have another zero each.
+fn unit_of(key: &str) -> Option<(String, f64)> {
+    let words: Vec<&str> = key.split('_').collect();
+    let unit = match words[..] {
+        [.., above, "per", below] => format!("{above}/{below}"),
+        [.., last] => last.to_owned(),
+        [] => return None,
+    };
+    size(&unit)
+}
+
+/// What a unit measures, and how much of it.
+fn size(unit: &str) -> Option<(String, f64)> {
+    let unit = unit.trim_end_matches('.');
+    if let Some((above, below)) = unit.split_once('/') {
+        let (above, below) = (size(above)?, size(below)?);
+        return Some((format!("{}/{}", above.0, below.0), above.1 / below.1));
+    }
+    const ARC_SECOND: f64 = core::f64::consts::PI / 648_000.0;
+    let (what, size) = match unit {
+        "m" => ("length", 1.0),
+        "cm" => ("length", 1e-2),
+        "mm" => ("length", 1e-3),
+        "um" | "µm" | "μm" => ("length", 1e-6),
+        "nm" => ("length", 1e-9),
+        "in" | "inch" => ("length", 0.0254),
+        "s" | "sec" => ("time", 1.0),
+        "ms" => ("time", 1e-3),
+        "us" | "µs" | "μs" => ("time", 1e-6),
+        "min" => ("time", 60.0),
+        "h" | "hr" => ("time", 3600.0),
+        "s2" => ("time2", 1.0),
+        "s3" => ("time3", 1.0),
+        "V" | "v" => ("voltage", 1.0),
+        "mV" | "mv" => ("voltage", 1e-3),
+        "deg" | "°" => ("angle", 3600.0 * ARC_SECOND),
+        "arcsec" | "″" => ("angle", ARC_SECOND),
+        "arcmin" | "′" => ("angle", 60.0 * ARC_SECOND),
+        "rad" => ("angle", 1.0),
+        "mrad" => ("angle", 1e-3),
+        "urad" | "µrad" | "μrad" => ("angle", 1e-6),
+        "Hz" | "hz" => ("frequency", 1.0),
+        "kHz" | "khz" => ("frequency", 1e3),
+        "Pa" | "pa" => ("pressure", 1.0),
+        "hPa" | "hpa" | "mbar" => ("pressure", 1e2),
+        "kPa" | "kpa" => ("pressure", 1e3),
+        _ => return None,
+    };
+    Some((what.to_owned(), size))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_unit_is_converted_to_that_of_the_key() {
+        for (number, unit, key, value) in [
+            ("0.05", "mm", "position_window_um", Some("50.0")),
+            ("200000", "um/s", "speed_mm_per_s", Some("200.0")),
+            ("3", "m/s²", "acceleration_mm_per_s2", Some("3000.0")),
+            ("90", "°", "sector_deg", Some("90.0")),
+            ("1", "deg", "reach_arcsec", Some("3600.0")),
+            ("5", "ms", "speed_mm_per_s", None),
+            ("5", "mm", "samples", None),
+        ] {
+            assert_eq!(
+                converted(number, unit, key).as_deref(),
+                value,
+                "{number} {unit}"
+            );
+        }
+    }
 
     #[test]
     fn a_unit_behind_a_number_is_known_and_anything_else_is_none() {

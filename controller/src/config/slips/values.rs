@@ -2,7 +2,7 @@
 
 use super::{Parts, Slip};
 use crate::config::diagnostic::shown;
-use crate::config::unit::{is_unit, split_unit};
+use crate::config::unit::{converted, is_unit, split_unit};
 
 pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
     let value = parts.value?;
@@ -45,7 +45,11 @@ fn decimal_comma(parts: &Parts<'_>, value: &str) -> Option<Slip> {
             "write a point before the decimals: {meant}; where the comma parts thousands: {whole}{part}"
         ),
     };
-    parts.value_meant(&meant, cause, help)
+    let slip = parts.value_meant(&meant, cause, help)?;
+    Some(Slip {
+        is_ambiguous: thousands,
+        ..slip
+    })
 }
 
 /// `12.5 mm` in place of a number.
@@ -56,8 +60,17 @@ fn with_a_unit(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         "`{}` is no number: the unit is in the key's name",
         shown(value)
     );
-    let help = format!("write {number} without `{unit}`, in the unit that the key ends with");
-    parts.value_meant(number, cause, help)
+    match converted(number, unit, parts.key) {
+        Some(other) if other.parse() != number.parse::<f64>() => {
+            let help = format!("write {other}, which is {number} {unit} in the key's unit");
+            parts.value_meant(&other, cause, help)
+        }
+        _ => {
+            let help =
+                format!("write {number} without `{unit}`, in the unit that the key ends with");
+            parts.value_meant(number, cause, help)
+        }
+    }
 }
 
 /// More digits than any number has here.
@@ -88,6 +101,12 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     {
         return None;
     }
+    // Spaces part thousands; the same number twice was pasted twice.
+    let mut groups = rest.split(' ');
+    let first = groups.next().unwrap_or_default();
+    if rest.contains(' ') && !groups.all(|it| it.len() >= 3 && it != first) {
+        return None;
+    }
     let digits: String = rest.chars().filter(|it| !"'_ ".contains(*it)).collect();
     if digits.matches('.').count() > 1 || !digits.chars().any(|it| it.is_ascii_digit()) {
         let help = "give one number, with one point before its decimals";
@@ -111,8 +130,8 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     parts.value_meant(&meant, cause, help)
 }
 
-/// Numbers of an identity (CiA 301, 0x1018) are written with eight digits, seldom with fewer than five.
-const IDENTITY_DIGITS: usize = 5;
+/// Keys whose numbers are written with eight hexadecimal digits (CiA 301, 0x1000 and 0x1018).
+const HEXADECIMAL: [&str; 4] = ["vendor_id", "product_code", "revision", "device_type"];
 
 /// `0X1F`, `1Fh`, `$1F` and the like.
 fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
@@ -128,8 +147,9 @@ fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let is_unit = marked.is_none() && letters == 0 && !digits.starts_with('0');
     let is_digits = digits.starts_with(|it: char| marked.is_some() || it.is_ascii_digit())
         && digits.chars().all(|it| it.is_ascii_hexdigit());
-    // `010` is ten with a zero before it; so many digits are an identity's.
-    let is_decimal = digits.len() == value.len() && letters == 0 && digits.len() < IDENTITY_DIGITS;
+    // `010` is ten with a zero before it, but in an identity.
+    let is_decimal =
+        digits.len() == value.len() && letters == 0 && !HEXADECIMAL.contains(&parts.key);
     if !is_digits || !is_number || is_unit || is_decimal {
         return None;
     }
@@ -143,7 +163,9 @@ fn list(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let begins = value.starts_with(['[', '(', '{']);
     let ends = value.ends_with([']', ')', '}']);
     let inner = value.trim_matches(['[', ']', '(', ')', '{', '}', ' ']);
-    if !(begins || ends) || inner.contains('=') {
+    // A remark in brackets behind a value is none.
+    let is_remark = !begins && value.contains(['(', '[', '{']);
+    if !(begins || ends) || is_remark || inner.contains('=') {
         return None;
     }
     let meant = format!("[{inner}]");
@@ -181,14 +203,35 @@ fn backslash(parts: &Parts<'_>, value: &str) -> Option<Slip> {
 /// A text with a quotation mark too few, or too many.
 fn quotes(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let inner = value.trim_matches(['"', '\'']);
+    if value.starts_with(['{', '[']) {
+        return None;
+    }
     if inner == value && !inner.contains(['"', '\'']) {
         return None;
+    }
+    if let Some(slip) = behind_a_text(parts, value) {
+        return Some(slip);
     }
     let inner: String = inner.chars().filter(|it| !"\"'".contains(*it)).collect();
     let meant = format!("\"{inner}\"");
     let cause = format!("the quotation marks of `{}` do not match", shown(value));
     let help = format!("write {}", shown(&meant));
     parts.value_meant(&meant, cause, help)
+}
+
+/// What stands behind the second mark is no part of the text: a remark, or a letter too many.
+fn behind_a_text(parts: &Parts<'_>, value: &str) -> Option<Slip> {
+    let quote = value.chars().next().filter(|it| "\"'".contains(*it))?;
+    let end = value[1..].find(quote)? + 2;
+    let (text, rest) = value.split_at(end);
+    if rest.is_empty() || rest.contains(quote) || text.len() == 2 {
+        return None;
+    }
+    let cause = format!("`{}` stands behind the text's end", shown(rest.trim()));
+    let help = format!("write {}; a remark begins with #", shown(text));
+    let mut slip = parts.value_meant(text, cause, help)?;
+    slip.at += end;
+    Some(slip)
 }
 
 /// A word that is no number and no `true` or `false`.

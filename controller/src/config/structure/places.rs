@@ -26,6 +26,17 @@ pub(super) fn of(schema: &Schema, key: &str) -> Option<String> {
     (!named.is_empty()).then(|| format!("{}{more}", named.join(", ")))
 }
 
+/// The section that has all of `keys`, the first of them.
+pub(super) fn of_all(schema: &Schema, keys: &[&str]) -> Option<String> {
+    let each = keys.iter().map(|key| {
+        let mut found = Vec::new();
+        walk(schema, "", key, &mut found);
+        found
+    });
+    let common = each.reduce(|all, own| all.into_iter().filter(|it| own.contains(it)).collect());
+    common?.into_iter().find(|it| !it.is_empty())
+}
+
 fn walk(schema: &Schema, path: &str, key: &str, found: &mut Vec<String>) {
     for (name, part) in schema["properties"].as_object().into_iter().flatten() {
         if name == key && !found.iter().any(|it| it == path) {

@@ -281,3 +281,53 @@ fn what_stands_between_keys_is_judged_beside_what_is_wrong_with_one() {
     ];
     assert_eq!(keys, expected, "{found:#?}");
 }
+
+#[test]
+fn sections_are_found_again_whose_names_were_lost_or_mistyped() {
+    for (from, to, key, help) in [
+        // Of another axis, of none, of one with a point in its name, and commented out.
+        (
+            "[axis.x.identity]",
+            "[axis.x1.identity]",
+            "axis.x1",
+            "did you mean [axis.x]?",
+        ),
+        ("[axis.x]", "[axis]", "axis", "write [axis.x]"),
+        (
+            "[axis.x.identity]",
+            "[\"axis.x.identity\"]",
+            "axis.x.identity",
+            "write `[axis.x.identity]`",
+        ),
+        (
+            "[axis.x.identity]",
+            "#[axis.x.identity]",
+            "axis.x.device_type",
+            "write the line [axis.x.identity] above",
+        ),
+        (
+            "stage_serial",
+            "stage.serial",
+            "machine.stage",
+            "write `stage_serial`",
+        ),
+    ] {
+        check(LINEAR, from, to, key, ["", help]);
+    }
+}
+
+#[test]
+fn what_stands_in_the_file_is_what_is_proposed() {
+    let proof = "[axis.x]\nkept_zero = { by = \"mark\", object = 0x2F00 }\n";
+    let says = ["this is a whole number", "write it in quotes: \"0x2F00\""];
+    check(LINEAR, "[axis.x]\n", proof, "axis.x.kept_zero.object", says);
+    let says = ["this is a list", "without brackets: 0x000007FF"];
+    let to = "vendor_id = [0x000007FF]";
+    check(
+        LINEAR,
+        "vendor_id = 0x000007FF",
+        to,
+        "axis.x.identity.vendor_id",
+        says,
+    );
+}

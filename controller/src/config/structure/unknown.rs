@@ -4,12 +4,13 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 
 use super::section::Section;
-use super::{Found, Part, any, places};
+use super::{Found, any, places};
 use crate::config::judge::Finding;
 use crate::config::lines::below;
 use crate::config::meant::key_meant;
+use crate::config::place::Part;
 use crate::config::repair::{Repair, join};
-use crate::config::schema::DEVICE;
+use crate::config::schema::without_null;
 
 /// The sections of which a part has a mistyped name, `[axes.x]` beside `[axis.x.zero]`, with that part.
 pub(super) fn merged(seen: &Table, section: &Section<'_>) -> Table {
@@ -32,25 +33,6 @@ pub(super) fn merged(seen: &Table, section: &Section<'_>) -> Table {
         }
     }
     merged
-}
-
-/// Whether `[axis.zero]` was written for `[axis.x.zero]`.
-pub(super) fn is_part_of_one(name: &str, inner: &Table, own: &Schema) -> bool {
-    let section = Section::of(own, inner);
-    let is_key = section.keys.contains_key(name) || section.is_of_another_device(name);
-    is_key && name != DEVICE && !inner.contains_key(DEVICE)
-}
-
-pub(super) fn without_name(path: &str, part: &str, seen: &Table, found: &mut Found<'_>) {
-    let key = below(path, part);
-    let names: Vec<_> = seen.keys().filter(|it| *it != part).collect();
-    let name = names.first().map_or("NAME", |it| it.as_str());
-    let cause = format!("`{part}` is a section of one of [{path}.NAME], and says not of which");
-    let help = format!("write [{path}.{name}.{part}]");
-    found.repairs.push(Repair::Remove { key: key.clone() });
-    found
-        .findings
-        .push((Finding { key, cause, help }, Part::Name));
 }
 
 /// Says what is wrong with a key that the section does not have; gives that of `free` which was meant.
@@ -76,6 +58,11 @@ pub(super) fn unknown<'a>(
             .push((Finding { key, cause, help }, Part::Name));
     };
     let remove = || Repair::Remove { key: key.clone() };
+    if let Some(joined) = joined(name, value, section) {
+        let help = format!("write `{joined}`: the words of a key are joined by _");
+        tell("there is no such key here".to_owned(), help, remove());
+        return Some(joined);
+    }
     if is_anothers {
         tell(section.has_no_such_key(), "remove it".to_owned(), remove());
         return None;
@@ -100,6 +87,54 @@ pub(super) fn unknown<'a>(
         any(&key, value, section.keys[named], found);
     }
     meant.filter(|_| named.is_some())
+}
+
+/// `stage.serial` is a section with a key, and was meant to be a key.
+fn joined<'a>(name: &str, value: &Value, section: &Section<'a>) -> Option<&'a str> {
+    let mut keys = value.as_table()?.keys();
+    let joined = format!("{name}_{}", keys.next()?);
+    let known = section.keys.get_key_value(joined.as_str());
+    known.filter(|_| keys.next().is_none()).map(|it| *it.0)
+}
+
+/// Keys of another section, of which the heading above them is missing: at least two, all of one.
+pub(super) fn orphans<'a>(
+    (path, seen): (&str, &'a Table),
+    section: &Section<'_>,
+    free: &[&str],
+    schema: &Schema,
+) -> Option<(Vec<&'a str>, String)> {
+    let strange = seen.iter().filter(|(key, value)| {
+        let is_own = section.keys.contains_key(key.as_str()) || section.is_of_another_device(key);
+        !is_own && !value.is_table() && key_meant(key, free).is_none()
+    });
+    let strange: Vec<&str> = strange.map(|(key, _)| key.as_str()).collect();
+    // A section of this one is nearer than any other.
+    let has_all = |own: &Schema| {
+        let inner = &without_null(own)["properties"];
+        strange.iter().all(|it| !inner[*it].is_null())
+    };
+    let inner = section.keys.iter().find(|(_, own)| has_all(own));
+    let home = match inner {
+        Some((name, _)) => below(path, name),
+        None => places::of_all(schema, &strange)?,
+    };
+    (strange.len() > 1).then_some((strange, home))
+}
+
+pub(super) fn tell_orphans(path: &str, orphans: &[&str], home: &str, found: &mut Found<'_>) {
+    let keys = orphans.iter().map(|it| below(path, it));
+    let mut keys: Vec<String> = keys.collect();
+    let repairs = keys.iter().cloned().map(|key| Repair::Remove { key });
+    found.repairs.extend(repairs);
+    keys.sort_by_key(|it| found.written(it, Part::Name).map(|it| it.start));
+    let names: Vec<_> = orphans.iter().map(|it| format!("`{it}`")).collect();
+    let cause = format!("{} are keys of [{home}]", names.join(", "));
+    let help = format!("write the line [{home}] above them, or remove them");
+    let key = keys.into_iter().next().unwrap_or_default();
+    found
+        .findings
+        .push((Finding { key, cause, help }, Part::Name));
 }
 
 /// What to say of a key that is like none of those that are `free`.

@@ -60,7 +60,8 @@ pub(super) const fn kind(value: &Value) -> &'static str {
     }
 }
 
-pub(super) fn correction(expected: &str, value: &Value) -> String {
+/// What to write instead of a value that stands in the file as `written`.
+pub(super) fn correction(expected: &str, value: &Value, written: &str) -> String {
     match (expected, value) {
         ("number" | "integer", Value::String(text)) => match number_in(text) {
             Some(number) if number == text => format!("write it without quotes: {number}"),
@@ -79,13 +80,16 @@ pub(super) fn correction(expected: &str, value: &Value) -> String {
             _ => "give true or false".into(),
         },
         ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
-            format!("write it in quotes: \"{value}\"")
+            format!("write it in quotes: \"{written}\"")
         }
         ("integer", Value::Float(it)) if it.is_finite() => format!("write {it:.0}"),
         ("array", Value::Table(_)) => "write a list: [...]".into(),
         ("array", _) => "write it in brackets: [...]".into(),
         ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
-            [one] => format!("write it without brackets: {one}"),
+            [_] => {
+                let one = written.trim_matches(['[', ']', ' ', ',']);
+                format!("write it without brackets: {one}")
+            }
             _ => format!("give {} and no list", in_words(expected)),
         },
         ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),

@@ -20,7 +20,10 @@ fn check(from: &str, to: &str, key: &str, says: [&str; 2]) {
 
 #[test]
 fn a_number_with_a_unit_says_how_it_is_written() {
-    let says = ["`0.2 mm` is no number", "write 0.2 without `mm`"];
+    let says = [
+        "`0.2 mm` is no number",
+        "write 200.0, which is 0.2 mm in the key's unit",
+    ];
     let from = "standard_uncertainty_limit_um = 0.2";
     let key = "axis.x.zero.standard_uncertainty_limit_um";
     check(from, "standard_uncertainty_limit_um = 0.2 mm", key, says);
@@ -205,4 +208,118 @@ fn a_file_without_a_line_that_is_right_is_told_in_short() {
     assert!(findings.len() < 40, "{}", findings.len());
     let says = |it: &Diagnostic| it.help.contains("175 more places");
     assert!(findings.iter().any(says), "{findings:#?}");
+}
+
+/// One finding, whose help ends with what was there before.
+#[track_caller]
+fn check_meant(text: &str, from: &str, to: &str, meant: &str) {
+    let found = match parse(&text.edit_first(from, to), "m.toml") {
+        Err(ConfigError::Invalid { findings }) => findings,
+        other => panic!("{to}: {other:?}"),
+    };
+    let [one] = &found[..] else {
+        panic!("{to}: {found:#?}")
+    };
+    let is_told = one.help.contains("write ") && one.help.contains(meant);
+    assert!(is_told, "{to}: {one}");
+}
+
+#[test]
+fn what_is_proposed_is_a_line_that_the_section_takes() {
+    let key = "standard_uncertainty_limit_um = ";
+    for value in [
+        "O.2",
+        "0.2 (checked)",
+        "~0.2",
+        "0.2 +/- 0.05",
+        "0.2 0.2",
+        "0..2",
+        "0.2^M",
+        "0.2x7",
+        "0.0002 mm",
+        "″0.2″",
+    ] {
+        check_meant(
+            LINEAR,
+            &format!("{key}0.2"),
+            &format!("{key}{value}"),
+            "0.2",
+        );
+    }
+    let (from, rate) = ("baud_bit_per_s = 115200", "baud_bit_per_s = ");
+    for value in ["115,200", "115.200,0", "115 200", "1l5200", "0115200"] {
+        check_meant(LINEAR, from, &format!("{rate}{value}"), "115200");
+    }
+    let text = "device = \"cia402\"";
+    for line in [
+        "set device = \"cia402\"",
+        "- device = \"cia402\"",
+        "12: device = \"cia402\"",
+        "dev#ice = \"cia402\"",
+        "device = \"cia402\"q",
+        "device = \"cia\n402\"",
+        "device =\n  \"cia402\"",
+    ] {
+        let meant = match line.find("device") {
+            Some(0) if line.ends_with('q') => "\"cia402\"",
+            _ => text,
+        };
+        check_meant(LINEAR, text, line, meant);
+    }
+    check_meant(
+        LINEAR,
+        text,
+        "device = \"cia402\"   the x axis",
+        "\"cia402\"; a remark begins with #",
+    );
+    for value in [
+        "[5.0, 5.0]  (checked)",
+        "[5.0, 5.0)",
+        "5.0, 5.0",
+        "(5.0; 5.0)",
+    ] {
+        let line = format!("full_scale_v = {value}");
+        check_meant(LINEAR, "full_scale_v = [5.0, 5.0]", &line, "[5.0, 5.0]");
+    }
+}
+
+#[test]
+fn a_heading_is_proposed_that_is_there() {
+    for (from, to) in [
+        ("[axis.x.identity]", "[axis,x.identity]"),
+        ("[axis.x.identity]", "[axis..x.identity]"),
+        ("[axis.x.identity]", "[axis.x.identity] ="),
+        ("[axis.x.identity]", "axis.x.identity:"),
+        ("[axis.x.identity]", "[axis.x.ident"),
+        ("[axis.x.identity]", "[[axis.x.identity]]"),
+        ("[machine]", "machine:"),
+    ] {
+        check_meant(LINEAR, from, to, from);
+    }
+    const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
+    let actuator = "[[platform.actuator]]";
+    check_meant(UVW, actuator, "(platform.actuator)", actuator);
+}
+
+#[test]
+fn a_section_within_a_line_is_proposed_as_a_whole() {
+    let wanted = "{ by = \"mark\", object = \"0x2F00:01\" }";
+    for value in [
+        "{ by = mark, object = 0x2F00:01 }",
+        "{ by: \"mark\", object: \"0x2F00:01\" }",
+        "{ \"by\": \"mark\", \"object\": \"0x2F00:01\" }",
+        "{ by = \"mark\"; object = \"0x2F00:01\" ]",
+        "by = \"mark\", object = \"0x2F00:01\"",
+        "{ by = “mark”, object = “0x2F00:01” }",
+    ] {
+        let to = format!("[axis.x]\nkept_zero = {value}\n");
+        let found = match parse(&LINEAR.edit("[axis.x]\n", &to), "m.toml") {
+            Err(ConfigError::Invalid { findings }) => findings,
+            other => panic!("{value}: {other:?}"),
+        };
+        let [one] = &found[..] else {
+            panic!("{value}: {found:#?}")
+        };
+        assert!(one.help.contains(wanted), "{value}: {one}");
+    }
 }

@@ -1,0 +1,115 @@
+//! The name of a section whose brackets, or the points between its parts, are not as they must be.
+
+use serde_json::Value as Schema;
+
+use super::{Parts, Slip, is_toml};
+use crate::config::diagnostic::shown;
+use crate::config::wanted::{is_list, section_meant};
+
+const OPEN: [char; 4] = ['[', '(', '{', '<'];
+const CLOSED: [char; 4] = [']', ')', '}', '>'];
+/// What parts a name elsewhere.
+const BETWEEN: [char; 8] = ['.', ' ', '/', '\\', ',', ':', ';', '|'];
+const QUOTES: [char; 4] = ['"', '\'', '“', '”'];
+
+/// A line that was meant to begin a section.
+struct Heading<'a> {
+    line: &'a str,
+    at: usize,
+    parts: Vec<&'a str>,
+    is_list: bool,
+}
+
+impl<'a> Heading<'a> {
+    fn of(parts: &Parts<'a>) -> Option<Self> {
+        let bare = bare(parts);
+        let is_bracketed = bare.starts_with(OPEN) || bare.ends_with(CLOSED);
+        is_bracketed.then(|| Self::named(parts))?
+    }
+
+    fn named(parts: &Parts<'a>) -> Option<Self> {
+        let (line, bare) = (parts.said.trim(), bare(parts));
+        if bare.contains('=') {
+            return None;
+        }
+        let inner = bare.trim_start_matches(OPEN);
+        if inner.contains(OPEN) {
+            return None;
+        }
+        let name = inner.split(CLOSED).next().unwrap_or_default();
+        let named = name.split(BETWEEN).map(|it| it.trim_matches(QUOTES));
+        Some(Self {
+            line,
+            at: parts.said.len() - parts.said.trim_start().len(),
+            parts: named.filter(|it| !it.is_empty()).collect(),
+            is_list: bare.starts_with("[[") || (!bare.starts_with('[') && bare.ends_with("]]")),
+        })
+    }
+
+    fn told(&self, name: &str) -> Option<Slip> {
+        let meant = match self.is_list {
+            true => format!("[[{name}]]"),
+            false => format!("[{name}]"),
+        };
+        let is_name = |it: char| it.is_ascii_alphanumeric() || "_-.".contains(it);
+        if name.is_empty() || !name.chars().all(is_name) || !is_toml(&meant) {
+            return None;
+        }
+        let cause = format!("`{}` names no section", shown(self.line));
+        let help =
+            format!("write `{meant}`: a section's name stands in brackets, its parts with points");
+        // Words in other brackets may be a remark: what follows stays where it is.
+        let is_remark = !self.line.starts_with('[') && self.line.contains(' ');
+        let meant = Some(meant).filter(|_| !is_remark);
+        Some(Slip::new(self.at, cause, help, meant))
+    }
+}
+
+/// A line without what ends one elsewhere.
+fn bare<'a>(parts: &Parts<'a>) -> &'a str {
+    let line = parts.said.trim();
+    line.trim_end_matches(['=', ':', ',', ';', '.', ' '])
+}
+
+/// A name of several parts without any brackets, of which the first is known.
+fn without_brackets<'a>(parts: &Parts<'a>, schema: &Schema) -> Option<Heading<'a>> {
+    let heading = Heading::named(parts)?;
+    let first = heading.parts.first()?;
+    let is_ended = parts.said.trim().ends_with(':');
+    let is_name = (heading.parts.len() > 1 || is_ended) && !bare(parts).contains([' ', ':', ',']);
+    let is_known = schema["properties"].get(*first).is_some();
+    (is_name && is_known && parts.value.is_none()).then_some(heading)
+}
+
+pub(super) fn of_line(parts: &Parts<'_>) -> Option<Slip> {
+    if parts.value.is_some() {
+        return None;
+    }
+    let heading = Heading::of(parts)?;
+    heading.told(&heading.parts.join("."))
+}
+
+/// Likewise where the schema tells what sections there are; one that begins like none of them is none.
+pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> {
+    let parts = Parts::of(line);
+    let heading = Heading::of(&parts).or_else(|| without_brackets(&parts, schema))?;
+    if heading.parts.is_empty() && heading.line != "[]" {
+        return None;
+    }
+    if let Some(name) = section_meant(schema, &heading.parts) {
+        let is_list = is_list(schema, &name);
+        return Heading { is_list, ..heading }.told(&name);
+    }
+    let known = schema["properties"].as_object()?;
+    let known: Vec<_> = known.keys().map(|it| format!("[{it}]")).collect();
+    let cause = format!("`{}` names no section", shown(heading.line));
+    let help = match heading.line.starts_with('[') && heading.line.ends_with(']') {
+        true => format!("sections are {}, and those in them", known.join(", ")),
+        false => "remove it, or begin it with #".to_owned(),
+    };
+    let is_lost_heading = heading.line.starts_with('[');
+    Some(Slip {
+        is_lost_heading,
+        ..Slip::new(heading.at, cause, help, None)
+    })
+}

@@ -1,0 +1,210 @@
+//! What a line that is no TOML was meant to be, by what its section can hold: what is proposed is a line that the
+//! section takes.
+
+use toml::Table;
+
+use super::{Parts, Slip, is_key, is_toml, loosely, nothing_known};
+use crate::config::diagnostic::shown;
+use crate::config::meant::key_meant;
+use crate::config::wanted::Wanted;
+
+/// What is wrong with `line`; `at` is where the reader of TOML stopped.
+pub(in crate::config) fn of_line(line: &str, at: usize, wanted: &Wanted<'_>) -> Slip {
+    let slip = super::of_line(line, at);
+    let is_key = slip.meant.as_deref().is_none_or(|it| it.contains('='));
+    let is_taken = slip.meant.as_deref().is_some_and(|it| wanted.takes(it));
+    if slip.is_comment {
+        return no_comment(slip, line, wanted);
+    }
+    if !slip.is_ambiguous && (!is_key || is_taken) {
+        return slip;
+    }
+    let parts = Parts::of(line);
+    if slip.is_ambiguous {
+        return of_two(slip, &parts, wanted);
+    }
+    joined_heading(&parts, wanted)
+        .or_else(|| by_value(&parts, &slip, wanted))
+        .or_else(|| by_letter(line, wanted))
+        .or_else(|| by_key(&parts, wanted))
+        .or_else(|| by_separator(&parts, wanted))
+        .unwrap_or_else(|| without_invention(slip, &parts, wanted))
+}
+
+/// Of two meanings the one that the key can have; where it can have both, nothing is judged by either.
+fn of_two(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip {
+    let value = parts.value.unwrap_or_default();
+    let ways = [value.replace(',', "."), value.replace(',', "")];
+    let takes = ways.each_ref().map(|it| wanted.takes(&parts.with(it)));
+    match takes {
+        [true, true] => Slip {
+            meant: None,
+            ..slip
+        },
+        [false, true] => by_value(parts, &slip, wanted).unwrap_or(slip),
+        [_, false] => Slip {
+            help: format!("write a point before the decimals: {}", ways[0]),
+            ..slip
+        },
+    }
+}
+
+/// A line that somebody took out by the sign of another language may be one that is needed.
+fn no_comment(mut slip: Slip, line: &str, wanted: &Wanted<'_>) -> Slip {
+    let rest = line[slip.at..].trim_start_matches(|it: char| !it.is_alphanumeric());
+    let rest = rest.strip_prefix("REM ").unwrap_or(rest).trim();
+    let rest = ["*/", "-->"]
+        .iter()
+        .fold(rest, |rest, end| rest.trim_end_matches(end).trim());
+    if wanted.takes(rest) {
+        let key = rest.split('=').next().unwrap_or_default().trim();
+        slip.help += &format!(", or write `{}` where {key} is to hold", shown(rest));
+        slip.meant = None;
+        slip.key = Some(key.to_owned());
+    }
+    slip
+}
+
+fn by_value(parts: &Parts<'_>, slip: &Slip, wanted: &Wanted<'_>) -> Option<Slip> {
+    let raw = parts.value?;
+    let value = loosely::read(raw, parts.key, wanted)?;
+    let cause = match slip.meant {
+        // That which was found wrong is not what was meant.
+        Some(_) => unreadable(raw),
+        None => slip.cause.clone(),
+    };
+    let meant = parts.with(&value);
+    let has_remark = raw.len() > value.len() + 2;
+    let help = match has_remark {
+        true => format!("write {}; a remark begins with #", shown(&value)),
+        false => format!("write {}", shown(&value)),
+    };
+    Some(Slip::new(parts.value_at, cause, help, Some(meant)))
+}
+
+/// A section begins where the line should end.
+fn joined_heading(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let value = parts.value?;
+    let at = value.rfind('[').filter(|_| value.ends_with(']'))?;
+    let (before, heading) = value.split_at(at);
+    let meant = parts.with(before.trim());
+    if !(wanted.takes(&meant) && is_toml(heading)) {
+        return None;
+    }
+    let cause = format!(
+        "the section `{}` begins in the middle of a line",
+        shown(heading)
+    );
+    let help = format!("begin a new line before `{}`", shown(heading));
+    Some(Slip {
+        is_lost_heading: true,
+        ..Slip::new(parts.value_at + at, cause, help, Some(meant))
+    })
+}
+
+/// Something else than `=` parts the key and its value.
+fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let line = parts.said.trim();
+    let end = line.find(|it| !is_of_key(it))?;
+    let (key, rest) = line.split_at(end);
+    let value = loosely::read(rest.trim_start_matches([':', '=', '>', ' ']), key, wanted)?;
+    let cause = "a key and its value are parted by one `=`".to_owned();
+    let help = format!("write `{key} = {}`", shown(&value));
+    let meant = format!("{key} = {value} {}", parts.comment);
+    Some(Slip::new(0, cause, help, Some(meant)))
+}
+
+/// A value that goes on in the next line, as one line.
+pub(in crate::config) fn of_two_lines(line: &str, next: &str, wanted: &Wanted<'_>) -> Option<Slip> {
+    let parts = Parts::of(line);
+    let value = parts.value?;
+    let is_open = value.is_empty() || value.starts_with(['"', '\'']);
+    let between = if value.is_empty() { " " } else { "" };
+    let whole = format!("{}{between}{}", parts.said.trim_end(), next.trim_start());
+    let is_own = is_toml(next) && !next.trim_start().starts_with('[');
+    if !is_open || is_own || !wanted.takes(&whole) {
+        return None;
+    }
+    let said = Parts::of(&whole).said.trim().to_owned();
+    let cause = "the line ends within a value".to_owned();
+    let help = format!("write it in one line: `{}`", shown(&said));
+    Some(Slip::new(parts.value_at, cause, help, Some(whole)))
+}
+
+fn unreadable(raw: &str) -> String {
+    format!("`{}` cannot be read as it is written here", shown(raw))
+}
+
+/// One character is too many, and only one can be that.
+fn by_letter(line: &str, wanted: &Wanted<'_>) -> Option<Slip> {
+    let mut found: Option<(usize, char, String, Table)> = None;
+    // Of an identity that is one digit short nobody knows which was meant.
+    if Parts::of(line).value.is_some_and(|it| it.starts_with("0x")) {
+        return None;
+    }
+    for (at, it) in line.char_indices().filter(|(_, it)| !it.is_whitespace()) {
+        let rest = format!("{}{}", &line[..at], &line[at + it.len_utf8()..]);
+        if !wanted.takes(&rest) {
+            continue;
+        }
+        let table: Table = rest.parse().ok()?;
+        match &found {
+            Some((.., before)) if *before != table => return None,
+            Some(_) => {}
+            None => found = Some((at, it, rest, table)),
+        }
+    }
+    let (at, it, meant, _) = found?;
+    let said = Parts::of(&meant).said.trim().to_owned();
+    let cause = format!("the `{}` does not belong here", shown(&it.to_string()));
+    let help = format!("write `{}`", shown(&said));
+    Some(Slip::new(at, cause, help, Some(meant)))
+}
+
+/// Something stands before the key, or in it.
+fn by_key(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let raw = parts.value?;
+    let letters: String = parts.key.chars().filter(|it| is_of_key(*it)).collect();
+    let last = parts.key.rsplit(|it| !is_of_key(it)).next();
+    let known = last.filter(|it| wanted.has(it)).map(str::to_owned);
+    let joined = Some(&letters).filter(|it| wanted.has(it)).cloned();
+    let alike = key_meant(&letters, &wanted.keys()).map(str::to_owned);
+    let key = known.or(joined).or(alike)?;
+    let as_is = format!("{key} = {raw}");
+    let value = match wanted.takes(&as_is) {
+        true => raw.to_owned(),
+        false => loosely::read(raw, &key, wanted)?,
+    };
+    let cause = format!("`{}` is no key", shown(parts.key));
+    let help = format!("write `{key} = {}`", shown(&value));
+    let meant = format!("{key} = {value} {}", parts.comment);
+    Some(Slip::new(0, cause, help, Some(meant)))
+}
+
+fn is_of_key(it: char) -> bool {
+    it.is_ascii_alphanumeric() || "_-".contains(it)
+}
+
+/// A word that is no key of the section is none that wants a value; one that is cut short may be a longer one.
+fn without_invention(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip {
+    let word = parts.said.trim();
+    let is_alone = is_key(word);
+    let word = word.split([':', ' ', '\t']).next().unwrap_or_default();
+    if wanted.keys().is_empty() || parts.value.is_some() || !is_key(word) || wanted.has(word) {
+        return slip;
+    }
+    let keys = wanted.keys();
+    let longer = keys.iter().filter(|it| it.starts_with(word)).count();
+    match key_meant(word, &keys).filter(|_| longer < 2) {
+        Some(key) if is_alone => Slip {
+            help: format!("write `{key} = value`, or remove it"),
+            ..slip
+        },
+        Some(_) => slip,
+        None if longer > 1 => Slip {
+            help: "write the key to its end, and a value, or remove it".into(),
+            ..slip
+        },
+        None => nothing_known(parts),
+    }
+}

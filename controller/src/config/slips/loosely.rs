@@ -1,0 +1,191 @@
+//! Values read as loosely as people write them, by what the key can have: digits from text, texts from what looks like
+//! quotes, lists without brackets.
+
+use serde_json::Value as Schema;
+
+use crate::config::schema::type_of;
+use crate::config::unit::{converted, split_unit};
+use crate::config::wanted::Wanted;
+
+/// What `raw` was meant to be, as a value of `key`; `None` where that cannot be told.
+pub(super) fn read(raw: &str, key: &str, wanted: &Wanted<'_>) -> Option<String> {
+    // The end of a line of Windows, as some programs show it.
+    let raw = raw.trim_end_matches("^M").trim();
+    let mut tokens = raw.split_whitespace();
+    let first = tokens.next()?;
+    let raw = match raw.len() > first.len() && tokens.all(|it| it == first) {
+        true => first,
+        false => raw,
+    };
+    let ways = wanted.ways(key).into_iter();
+    let mut candidates = ways.flat_map(|it| candidates(raw, key, it));
+    candidates.find(|it| wanted.takes(&format!("{key} = {it}")))
+}
+
+fn candidates(raw: &str, key: &str, schema: &Schema) -> Vec<String> {
+    match type_of(schema) {
+        "number" | "integer" => numbers(raw, key),
+        "string" => text(raw).into_iter().collect(),
+        "array" => list(raw, key, &schema["items"]).into_iter().collect(),
+        "object" => section(raw, schema).into_iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// What stands around a number and is no part of it.
+fn is_around(it: char) -> bool {
+    !it.is_alphanumeric() && !"+-.".contains(it)
+}
+
+fn numbers(raw: &str, key: &str) -> Vec<String> {
+    let core = raw.trim_matches(is_around);
+    let rest = core.trim_start_matches(['-', '+', ' ']);
+    let sign = match core[..core.len() - rest.len()].contains('-') {
+        true => "-",
+        false => "",
+    };
+    let first = rest.split([' ', '(', '\t']).next().unwrap_or_default();
+    let by_unit = split_unit(rest).and_then(|(number, unit)| converted(number, unit?, key));
+    // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
+    let behind = rest[first.len()..].trim_start();
+    let is_remark = behind.starts_with(|it: char| it.is_alphabetic() || "(+±".contains(it));
+    let mut found = Vec::new();
+    found.extend(by_unit);
+    for text in [Some(rest), Some(first).filter(|_| is_remark)] {
+        let text: Option<String> = text.map(|it| it.chars().map(digit_meant).collect());
+        found.extend(text.iter().flat_map(|it| plain(it)));
+    }
+    found.iter().map(|it| format!("{sign}{it}")).collect()
+}
+
+/// Letters that look like digits.
+fn digit_meant(it: char) -> char {
+    match it {
+        'O' | 'o' => '0',
+        'l' | 'I' | '|' => '1',
+        _ => it,
+    }
+}
+
+/// The ways to read digits that are parted by points, commas, spaces and the like.
+fn plain(text: &str) -> Vec<String> {
+    if text.starts_with("0x") {
+        return vec![text.to_owned()];
+    }
+    let is_part = |it: char| it.is_ascii_digit() || ".,'_ ".contains(it);
+    let (mantissa, exponent) = match text.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, format!("e{exponent}")),
+        None => (text, String::new()),
+    };
+    if !mantissa.chars().all(is_part) || !mantissa.contains(|it: char| it.is_ascii_digit()) {
+        return Vec::new();
+    }
+    let decimal = mantissa.rfind(['.', ',']);
+    let whole = decimal.map_or(mantissa, |at| &mantissa[..at]);
+    let part = decimal.map(|at| &mantissa[at + 1..]);
+    let mut found = Vec::new();
+    if let Some(part) = part.filter(|it| is_digits(it))
+        && let Some(whole) = ungrouped(whole)
+    {
+        found.push(format!("{whole}.{part}{exponent}"));
+        let is_whole = part.chars().all(|it| it == '0');
+        found.extend(is_whole.then_some(whole));
+    }
+    // The last one parts thousands, too.
+    found.extend(ungrouped(mantissa).map(|it| format!("{it}{exponent}")));
+    found
+}
+
+fn is_digits(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|it| it.is_ascii_digit())
+}
+
+/// Digits in groups of three, without what parts them.
+fn ungrouped(text: &str) -> Option<String> {
+    let groups: Vec<&str> = text.split(['.', ',', '\'', '_', ' ']).collect();
+    let (first, rest) = groups.split_first()?;
+    let is_grouped = is_digits(first)
+        && (rest.is_empty() || first.len() <= 3)
+        && rest.iter().all(|it| it.len() == 3 && is_digits(it));
+    let digits = groups.concat();
+    let digits = match digits.trim_start_matches('0') {
+        "" => "0",
+        rest => rest,
+    };
+    is_grouped.then(|| digits.to_owned())
+}
+
+/// What is quoted first, by whatever marks.
+fn text(raw: &str) -> Option<String> {
+    let marks: &[char] = &[
+        '"', '\'', '“', '”', '„', '«', '»', '‘', '’', '‚', '‹', '›', '´', '`', '″', '′',
+    ];
+    let mut parts = raw.split(marks).map(str::trim);
+    let inner = match raw.contains(marks) {
+        true => parts.find(|it| !it.is_empty() && *it != "(" && *it != "[")?,
+        false => raw.trim_matches(['(', ')', '[', ']', ' ']),
+    };
+    let is_plain = !inner.is_empty() && !inner.contains(['\\', '#', '=']);
+    is_plain.then(|| format!("\"{inner}\""))
+}
+
+fn list(raw: &str, key: &str, items: &Schema) -> Option<String> {
+    let is_bracket = |it: char| "[](){}<>".contains(it);
+    // Behind the end there may be a remark.
+    let end = raw
+        .starts_with(is_bracket)
+        .then(|| raw.rfind(']'))
+        .flatten();
+    let raw = end.map_or(raw, |end| &raw[..end]);
+    let inner = raw.trim_matches(|it: char| is_bracket(it) || it.is_whitespace());
+    let by_mark: Vec<&str> = inner.split([',', ';', '/']).collect();
+    let by_space: Vec<&str> = inner.split_whitespace().collect();
+    let entries = match by_mark.len() {
+        1 => by_space,
+        _ => by_mark,
+    };
+    let entries = entries
+        .into_iter()
+        .map(str::trim)
+        .filter(|it| !it.is_empty());
+    let each = entries.map(|it| candidates(it, key, items).into_iter().next());
+    let each: Option<Vec<String>> = each.collect();
+    each.map(|it| format!("[{}]", it.join(", ")))
+}
+
+/// A section within one line, told apart by the names of its keys.
+fn section(raw: &str, schema: &Schema) -> Option<String> {
+    let own = Wanted::at(schema, "");
+    let mut names: Vec<(usize, &str)> = own
+        .keys()
+        .into_iter()
+        .flat_map(|it| places(raw, it))
+        .collect();
+    names.sort_unstable();
+    let ends = names.iter().skip(1).map(|it| it.0).chain([raw.len()]);
+    let is_around = |it: char| " \t=:,;{}()[]\"'“”„`′″<>".contains(it);
+    let each = names.iter().zip(ends).map(|((at, name), end)| {
+        let value = raw[at + name.len()..end].trim_matches(is_around);
+        let value = [value.to_owned(), format!("\"{value}\"")]
+            .into_iter()
+            .find(|it| own.takes(&format!("{name} = {it}")))?;
+        Some(format!("{name} = {value}"))
+    });
+    let each: Option<Vec<String>> = each.collect();
+    each.filter(|it| !it.is_empty())
+        .map(|it| format!("{{ {} }}", it.join(", ")))
+}
+
+/// Where `name` stands as a word by itself, outside a value.
+fn places<'a>(raw: &str, name: &'a str) -> Vec<(usize, &'a str)> {
+    let is_word = |it: char| it.is_ascii_alphanumeric() || it == '_';
+    let found = raw.match_indices(name).filter(|(at, _)| {
+        let before = raw[..*at].chars().next_back();
+        let after = raw[at + name.len()..]
+            .trim_start_matches(['"', '\''])
+            .trim_start();
+        before.is_none_or(|it| !is_word(it)) && after.starts_with(['=', ':', '"', '“', ' ', '-'])
+            || before.is_none_or(|it| !is_word(it)) && raw[at + name.len()..].starts_with(' ')
+    });
+    found.map(|(at, _)| (at, name)).collect()
+}
