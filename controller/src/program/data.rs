@@ -142,6 +142,9 @@ fn series_of(
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum PlanCommand {
+    /// A path of three axes, or a job of one: whether the axes can follow it within what is calibrated, and how long it
+    /// takes. No port is opened, nothing moves; `truestage run --dry-run` is the same.
+    Path(super::run::PlanArgs),
     /// Offsets of a plate on a rotary table that amplify noise least, or the amplification of given
     /// ones.
     Rotary(super::rotary::fit::PlanArgs),
@@ -156,6 +159,7 @@ pub(crate) enum PlanCommand {
 
 pub(crate) fn plan(command: &PlanCommand, output: Output) -> Ended {
     match command {
+        PlanCommand::Path(args) => super::run::plan(args.clone(), output),
         PlanCommand::Rotary(args) => super::rotary::fit::plan(args, output),
         PlanCommand::Screw(args) => super::platform::plan::run(args, output),
         PlanCommand::Zero(args) => super::linear::plan::run(args, output),

@@ -147,6 +147,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "plan path",
+        &["truestage plan path volumetric.toml path.csv --join linear --blend 50um"],
+    ),
+    (
         "plan rotary",
         &[
             "truestage plan rotary --lines 36 --placements 3",

@@ -40,6 +40,34 @@ pub(crate) struct RunArgs {
     agreed: AgreedArgs,
 }
 
+/// A path or a job that is only judged.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PlanArgs {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// The path, or the job (`.toml`).
+    path: Option<PathBuf>,
+    #[command(flatten)]
+    joined: JoinArgs,
+    #[command(flatten)]
+    agreed: AgreedArgs,
+}
+
+/// As `truestage run --dry-run`.
+pub(crate) fn plan(args: PlanArgs, output: Output) -> Ended {
+    let args = RunArgs {
+        machine: args.machine,
+        path: args.path,
+        dry_run: true,
+        yes: false,
+        resume: None,
+        first_part: false,
+        joined: args.joined,
+        agreed: args.agreed,
+    };
+    run(args, output)
+}
+
 /// What joins the rows of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum JoinName {

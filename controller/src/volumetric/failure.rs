@@ -376,8 +376,13 @@ impl From<NotWithin> for VolumetricFailure {
 #[derive(Debug, thiserror::Error)]
 pub enum PathRefusal {
     /// The axes cannot follow it: soft limits, speed, acceleration or jerk.
-    #[error(transparent)]
-    Point(#[from] PushError),
+    #[error("{}{source}", between(*lines))]
+    Point {
+        /// What cannot be driven.
+        source: PushError,
+        /// The lines of the rows that it is between.
+        lines: Option<[usize; 2]>,
+    },
     /// They cannot follow a corner of straight lines within what is allowed.
     #[error(
         "{source}; at this speed the corner in line {line} can be passed within {:.3} mm: allow as much, or go slower",
@@ -392,13 +397,22 @@ pub enum PathRefusal {
         wants: Metres,
     },
     /// It leaves the volume that is calibrated.
-    #[error("at {at_s:.4} s: {source}")]
+    #[error("{}at {at_s:.4} s: {source}", between(*lines))]
     Volume {
+        /// The lines of the rows that it is between.
+        lines: Option<[usize; 2]>,
         /// When it does, in seconds from the path's beginning.
         at_s: f64,
         /// Where it is then, and what is calibrated.
         source: Box<VolumetricFailure>,
     },
+}
+
+/// Where in its file a path is refused.
+fn between(lines: Option<[usize; 2]>) -> String {
+    lines.map_or_else(String::new, |[one, next]| {
+        format!("between lines {one} and {next}: ")
+    })
 }
 
 impl KindFailure for VolumetricFailure {

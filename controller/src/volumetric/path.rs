@@ -56,7 +56,14 @@ impl VolumePathJudge {
                 let place = Point::new(point[0], point[1], point[2]);
                 let at_s = f64::from(period) * engine.period().as_secs_f64();
                 let checked = check_in(&self.volume, self.reach, place).map_err(Box::new);
-                checked.map_err(|source| refused(PathRefusal::Volume { at_s, source }))?;
+                let lines = path.lines_at(at_s);
+                checked.map_err(|source| {
+                    refused(PathRefusal::Volume {
+                        lines,
+                        at_s,
+                        source,
+                    })
+                })?;
             }
         }
         Ok(path)
@@ -69,14 +76,18 @@ const JERK_OVER: f64 = 3.0;
 /// Why `path` is refused: where it is at a corner that the axes cannot follow, what they could.
 fn at_corner(source: PushError, path: &CsvPath, period: Duration) -> PathRefusal {
     let PushError::Refused(point) = &source else {
-        return source.into();
+        return PathRefusal::Point {
+            source,
+            lines: None,
+        };
     };
+    let lines = path.lines_at(point.at_s);
     // Along a line nothing speeds up.
     if !matches!(
         point.fault,
         PathFault::Acceleration { .. } | PathFault::Jerk { .. }
     ) {
-        return source.into();
+        return PathRefusal::Point { source, lines };
     }
     let off = |at_s: f64| (at_s - point.at_s).abs();
     // What is refused elsewhere is not about a corner; a jerk shows with the points after it.
@@ -90,7 +101,7 @@ fn at_corner(source: PushError, path: &CsvPath, period: Duration) -> PathRefusal
             line: corner.line,
             wants: corner.wants,
         },
-        None => source.into(),
+        None => PathRefusal::Point { source, lines },
     }
 }
 

@@ -43,6 +43,19 @@ pub struct CsvPath {
     pub longer: Duration,
     /// The corners of straight lines that the axes cannot follow within what is allowed.
     pub tight: Vec<TightCorner>,
+    /// When the curve passes each row, in seconds from its beginning, and the row's line in the file, counted from 1.
+    pub passes: Vec<(f64, usize)>,
+}
+
+impl CsvPath {
+    /// The lines of the rows that the curve runs between at `at_s` seconds.
+    #[must_use]
+    pub fn lines_at(&self, at_s: f64) -> Option<[usize; 2]> {
+        let next = self.passes.partition_point(|it| it.0 <= at_s);
+        let before = next.clamp(1, self.passes.len().saturating_sub(1).max(1)) - 1;
+        let both = self.passes.get(before..before + 2)?;
+        Some([both[0].1, both[1].1])
+    }
 }
 
 /// Where a curve is farthest from the straight line between the two rows that it runs between. Of straight lines it is the corner
@@ -145,6 +158,7 @@ fn along_spline(rows: &Rows, period: Duration) -> CsvPath {
         departure,
         longer: Duration::ZERO,
         tight: Vec::new(),
+        passes: passes(rows, |row| rows.times[row]),
     }
 }
 
@@ -168,7 +182,13 @@ fn along_lines(rows: &Rows, blend: Metres, form: &PathForm<'_>) -> CsvPath {
         departure: departure.unwrap_or_else(|| nowhere(rows)),
         longer: Duration::from_secs_f64((path.takes() - last).max(0.0)),
         tight: path.tight(&rows.lines),
+        passes: passes(rows, |row| path.passes(row)),
     }
+}
+
+fn passes(rows: &Rows, at_s: impl Fn(usize) -> f64) -> Vec<(f64, usize)> {
+    let lines = rows.lines.iter().enumerate();
+    lines.map(|(row, line)| (at_s(row), *line)).collect()
 }
 
 /// The departure of a path that leaves its joins nowhere.
@@ -253,6 +273,14 @@ mod tests {
     fn check(text: &str, expected: &str) {
         let error = read(text).unwrap_err();
         assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn each_moment_is_between_two_lines_of_the_file() {
+        let path = read("time_s,x_mm,y_mm\n0,0,0\n0.01,1,0\n0.03,2,0\n").unwrap();
+        let lines = [-1.0, 0.0, 0.009, 0.01, 0.02, 0.03, 9.0].map(|it| path.lines_at(it));
+        let expected = [[2, 3], [2, 3], [2, 3], [3, 4], [3, 4], [3, 4], [3, 4]];
+        assert_eq!(lines, expected.map(Some));
     }
 
     /// 3 u² − 2 u³ is the spline of one step between two rests.

@@ -270,6 +270,14 @@ fn jobs() -> Vec<Form> {
         ("number", whole()),
         ("journal", text()),
     ]);
+    let judged = [
+        ("axis", text()),
+        ("dry_run", constant(true)),
+        ("calibration", text()),
+        ("repetitions", whole()),
+        ("points", list(planned)),
+        ("goes_on", goes_on.or_null()),
+    ];
     vec![
         Form::new(
             "run",
@@ -287,18 +295,8 @@ fn jobs() -> Vec<Form> {
             ],
         )
         .counted(),
-        Form::new(
-            "run",
-            "a job with --dry-run",
-            [
-                ("axis", text()),
-                ("dry_run", constant(true)),
-                ("calibration", text()),
-                ("repetitions", whole()),
-                ("points", list(planned)),
-                ("goes_on", goes_on.or_null()),
-            ],
-        ),
+        Form::new("run", "a job with --dry-run", judged.clone()),
+        Form::new("plan path", "a job", judged),
     ]
 }
 

@@ -200,7 +200,8 @@ fn moves() -> Vec<Form> {
         )
         .counted(),
         Form::new("run", "a path", with_path(followed)).counted(),
-        Form::new("run", "a path with --dry-run", with_path(judged)),
+        Form::new("run", "a path with --dry-run", with_path(judged.clone())),
+        Form::new("plan path", "a path", with_path(judged)),
     ]
 }
 
