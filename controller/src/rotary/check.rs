@@ -1,7 +1,7 @@
 //! Whether what is said about a rotary axis makes sense.
 
 use compensator::rotary::{SAMPLES_MIN, WIDTHS_APART};
-use units::Radians;
+use units::{Radians, Short};
 
 use super::line_speed;
 use crate::config::MachineConfig;
@@ -303,7 +303,25 @@ fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryCon
             );
         }
     }
+    check_following_error(judge, rotary);
     rotary.node.check(judge, &config.can);
+}
+
+/// The drive holds it in counts: less than one is 0, and every move ends with an error then.
+fn check_following_error(judge: &mut Judge<'_>, rotary: &RotaryConfig) {
+    let limit = rotary.following_error_limit_arcsec;
+    let count = Radians::TURN.arcsec() / f64::from(rotary.counts_per_turn.max(1));
+    if limit > 0.0 && limit < count {
+        judge.say(
+            "following_error_limit_arcsec",
+            format!(
+                "{}″ are less than one count of {}″, and a drive holds it in whole counts",
+                Short(limit),
+                Short(count)
+            ),
+            "give what a move may lag behind, hundreds of counts or more",
+        );
+    }
 }
 
 /// What the drive's 32 bits can hold.
@@ -327,5 +345,24 @@ fn check_range(judge: &mut Judge<'_>, rotary: &RotaryConfig) {
                 format!("give at most {:.0}", REGISTER * 360.0 / counts),
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::validate::told::check;
+
+    #[test]
+    fn a_following_error_of_less_than_a_count_is_refused() {
+        let rotary = include_str!("../../../configs/machines/rotary.toml");
+        let (from, to) = ("limit_arcsec = 600.0", "limit_arcsec = 0.006");
+        let key = "rotary.c.following_error_limit_arcsec";
+        check(
+            rotary,
+            from,
+            to,
+            key,
+            "0.006″ are less than one count of 0.01″",
+        );
     }
 }

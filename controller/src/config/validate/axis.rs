@@ -37,7 +37,25 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
             "use a coarser resolution or a shorter range",
         );
     }
+    check_following_error(judge, axis);
     check_drive_units(judge, axis);
+}
+
+/// Drives hold it in counts: less than one is 0, and every move ends with an error then.
+fn check_following_error(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let limit_um = axis.motion.following_error_limit_um;
+    let count_um = axis.motion.resolution_nm.abs() * 1e-3;
+    if limit_um > 0.0 && limit_um < count_um {
+        judge.say(
+            "following_error_limit_um",
+            format!(
+                "{} µm are less than one count of {} µm, and a drive holds it in whole counts",
+                Short(limit_um),
+                Short(count_um)
+            ),
+            "give what a move may lag behind, hundreds of counts or more",
+        );
+    }
 }
 
 /// Drives hold speeds and accelerations in 32 bits, in units of their counts.
@@ -183,6 +201,15 @@ mod tests {
         check(AMPLIFIERS, from, "line = \"amps\"", key, says);
         let (from, key) = ("line = \"amps\"", "axis.u.line");
         check(AMPLIFIERS, from, "line = \"ampz\"", key, "ampz");
+        let from = "serial_number = 4001";
+        let says = "no amplifier calls itself so";
+        check(
+            AMPLIFIERS,
+            from,
+            "model = \" \"",
+            "axis.u.amplifier.model",
+            says,
+        );
         let (from, key) = ("poll_period_ms = 20.0", "axis.u.poll_period_ms");
         check(AMPLIFIERS, from, "poll_period_ms = 0.0", key, "");
     }
@@ -208,6 +235,16 @@ mod tests {
         check(linear, from, to, "axis.x.speed_mm_per_s", "107 mm/s");
         let (from, key) = ("resolution_nm = 10.0", "axis.u.speed_mm_per_s");
         check(AMPLIFIERS, from, "resolution_nm = 0.02", key, "do not fit");
+    }
+
+    #[test]
+    fn a_following_error_of_less_than_a_count_is_refused() {
+        let (from, to) = ("limit_um = 200.0", "limit_um = 0.002");
+        let key = "axis.u.following_error_limit_um";
+        for text in [DRIVES, AMPLIFIERS] {
+            let says = "0.002 µm are less than one count of 0.01 µm";
+            check(text, from, to, key, says);
+        }
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Whether a configuration makes sense: ranges, references, and what the buses can carry.
 
 pub(crate) mod axis;
+mod bus;
 pub(crate) mod drive;
 
 use std::collections::BTreeMap;
 
 use self::axis::{check_axis, check_lines};
+use self::bus::{check_bus, check_serial};
 use self::drive::check_axis_name;
 pub(super) use crate::config::judge::Finding;
 use crate::config::judge::Judge;
@@ -15,7 +17,6 @@ use drivers::protocol::bus_load::BusLoadError;
 
 use super::model::MachineConfig;
 use crate::bus_plan;
-use crate::hardware::bus::{CanBus, CanTransport};
 
 /// The version of the file format this program reads.
 const SCHEMA_VERSION: u32 = 1;
@@ -33,6 +34,12 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
     check_name(&mut Judge::at("machine".into(), &mut findings), config);
     for (name, bus) in &config.can {
         check_bus(&mut Judge::at(format!("can.{name}"), &mut findings), bus);
+    }
+    for (name, line) in &config.serial {
+        check_serial(
+            &mut Judge::at(format!("serial.{name}"), &mut findings),
+            line,
+        );
     }
     for (name, axis) in &config.axis {
         check_axis_name(&mut findings, "axis", name);
@@ -83,7 +90,7 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
             "use letters, digits, - and _",
         );
     }
-    if config.machine.stage_serial.is_empty() {
+    if config.machine.stage_serial.trim().is_empty() {
         judge.say(
             "stage_serial",
             "is empty",
@@ -95,30 +102,6 @@ fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
             "",
             "the machine has no axis",
             "add an [axis.NAME] or a [rotary.NAME] section",
-        );
-    }
-}
-
-fn check_bus(judge: &mut Judge<'_>, bus: &CanBus) {
-    let (wanted, given, other) = match bus.transport {
-        CanTransport::SocketCan => ("interface", bus.interface.is_some(), bus.path.is_some()),
-        CanTransport::Slcan => ("path", bus.path.is_some(), bus.interface.is_some()),
-    };
-    if !given || other {
-        let cause = format!(
-            "transport {:?} takes `{wanted}` and only that",
-            bus.transport
-        );
-        judge.say("transport", cause, format!("give `{wanted}`"));
-    }
-    const BITRATES: [u32; 8] = [
-        10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000,
-    ];
-    if !BITRATES.contains(&bus.bitrate_bit_per_s) {
-        judge.say(
-            "bitrate_bit_per_s",
-            format!("{} bit/s is not a CANopen bit rate", bus.bitrate_bit_per_s),
-            "CiA 301 has 10000, 20000, 50000, 125000, 250000, 500000, 800000, 1000000",
         );
     }
 }
@@ -203,6 +186,20 @@ pub(crate) mod told {
                 assert!(told, "{findings:?}");
             }
             other => panic!("{to}: {other:?}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told::check;
+
+    #[test]
+    fn a_serial_number_of_blanks_is_none() {
+        let linear = include_str!("../../../../configs/machines/linear.toml");
+        let key = "machine.stage_serial";
+        for blank in ["\"\"", "\"  \""] {
+            check(linear, "\"TS-LIN-0001\"", blank, key, "is empty");
         }
     }
 }

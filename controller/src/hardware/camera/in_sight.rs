@@ -79,11 +79,23 @@ impl InSightConfig {
 impl Family for InSightConfig {
     fn check(&self, judge: &mut Judge<'_>) {
         let job = self.job.to_ascii_lowercase();
-        if !(job.ends_with(".job") || job.ends_with(".jobx")) {
+        let own = job.strip_suffix(".job").or(job.strip_suffix(".jobx"));
+        if own.is_none_or(|it| it.trim().is_empty()) {
             judge.say(
                 "job",
                 format!("`{}` is not the name of a job", self.job),
                 "give the name that In-Sight Explorer shows, with `.job` or `.jobx`",
+            );
+        }
+        if self
+            .serial_number
+            .as_ref()
+            .is_some_and(|it| it.trim().is_empty())
+        {
+            judge.say(
+                "serial_number",
+                "is empty, and no camera calls itself so",
+                "give the number on its plate, or leave the key out",
             );
         }
         if Cell::parse(&self.result_cell).is_none() {

@@ -143,6 +143,10 @@ mod tests {
     fn what_no_camera_can_be_is_found_where_it_stands() {
         check("line = \"vision\"", "line = \"visoin\"", "camera.eye.line");
         check("platform.job", "platform", "camera.eye.job");
+        check("platform.job", " .job", "camera.eye.job");
+        let job = "job = \"platform.job\"";
+        let numbered = format!("{job}\nserial_number = \" \"");
+        check(job, &numbered, "camera.eye.serial_number");
         check("\"C7\"", "\"C400\"", "camera.eye.result_cell");
         let key = "camera.eye.length_um_per_unit";
         check("um_per_unit = 1.0", "um_per_unit = nan", key);

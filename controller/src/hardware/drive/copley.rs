@@ -120,6 +120,14 @@ impl Family for CopleyAxisConfig {
     }
 
     fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
+        let model = self.amplifier.as_ref().and_then(|it| it.model.as_ref());
+        if model.is_some_and(|it| it.trim().is_empty()) {
+            judge.say(
+                "amplifier.model",
+                "is empty, and no amplifier calls itself so",
+                "give what it says in parameter 0x80, or leave the key out",
+            );
+        }
         let name = &self.line;
         judge.known("line", name, wiring.serial, "serial line");
         if let Some(line) = wiring.serial.get(name)
