@@ -1,11 +1,20 @@
 //! How long a move takes at least.
 
+use core::time::Duration;
+
+use units::ShortSpan;
+
 /// How long a way takes at least, from rest to rest; a short one never reaches the speed.
 pub(crate) fn least_time(way: f64, speed: f64, acceleration: f64) -> f64 {
     match way < speed * speed / acceleration {
         true => 2.0 * (way / acceleration).sqrt(),
         false => way / speed + speed / acceleration,
     }
+}
+
+/// A time for people, however long.
+pub(crate) fn span(seconds: f64) -> ShortSpan {
+    ShortSpan(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
 
 #[cfg(test)]

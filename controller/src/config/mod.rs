@@ -8,6 +8,7 @@ mod certificates;
 pub(crate) mod dependence;
 #[cfg(any(feature = "program", test))]
 mod described;
+mod device_warnings;
 mod diagnostic;
 #[cfg(feature = "program")]
 pub(crate) mod explained;
@@ -19,6 +20,7 @@ pub(crate) mod lines;
 mod load;
 mod meant;
 mod model;
+mod motion_warnings;
 #[cfg(test)]
 mod mutated_tests;
 mod place;
@@ -29,6 +31,7 @@ pub(crate) mod schema;
 mod slips;
 mod structure;
 mod syntax;
+mod text_warnings;
 mod unit;
 pub(crate) mod validate;
 mod wanted;

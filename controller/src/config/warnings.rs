@@ -7,7 +7,7 @@ use units::{Metres, Short};
 
 use super::judge::{Finding, Judge};
 use super::model::MachineConfig;
-use super::watch_warnings;
+use super::{device_warnings, motion_warnings, text_warnings, watch_warnings};
 use crate::hardware::node::IdentityConfig;
 use crate::kinds::KINDS;
 
@@ -19,10 +19,13 @@ pub(super) fn of(config: &MachineConfig) -> Vec<Finding> {
     check_serial_numbers(config, &mut found);
     check_rates(config, &mut found);
     check_dead_paths(config, &mut found);
+    text_warnings::check(config, &mut found);
+    device_warnings::check(config, &mut found);
     watch_warnings::check(config, &mut found);
     for kind in KINDS {
         (kind.warnings)(config, &mut found);
     }
+    motion_warnings::check(config, &mut found);
     found
 }
 

@@ -1,13 +1,11 @@
 //! What is doubtful of how drives are watched: each by itself is sound, and by all of them nothing would be noticed.
 
-use core::time::Duration;
-
-use units::{Short, ShortSpan};
+use units::Short;
 
 use super::AxisConfig;
 use super::DriveConfig;
 use super::judge::{Finding, Judge};
-use super::least_time::least_time;
+use super::least_time::{least_time, span};
 use super::model::MachineConfig;
 use crate::rotary::RotaryConfig;
 
@@ -194,10 +192,6 @@ impl Watched {
             );
         }
     }
-}
-
-fn span(seconds: f64) -> ShortSpan {
-    ShortSpan(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
 
 pub(super) fn check(config: &MachineConfig, found: &mut Vec<Finding>) {

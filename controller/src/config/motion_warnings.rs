@@ -1,0 +1,352 @@
+//! What is doubtful of speeds, accelerations and ways against each other: mostly a unit that was mistaken for another.
+
+use units::Short;
+
+use super::AxisConfig;
+use super::judge::{Finding, Judge};
+use super::least_time::{least_time, span};
+use super::model::MachineConfig;
+use crate::rotary::RotaryConfig;
+
+/// No drive and no stage reaches its speed sooner, and nobody lets one take longer.
+const RAMP_S: (f64, f64) = (1e-3, 10.0);
+/// Nobody waits longer for one move.
+const WAY_MAX_S: f64 = 3600.0;
+/// The fastest possible is some times the usual speed.
+const SPEEDS: f64 = 1000.0;
+/// A quick stop is some times as hard as the end of a move.
+const QUICK_STOPS: f64 = 500.0;
+/// A lag of more than this share of the travel is no error any more: the axis stands.
+const LAG_SHARE: f64 = 0.1;
+/// An axis that may stand this far off has no place.
+const WINDOW_SHARE: f64 = 0.01;
+const TRAVEL_MM: (f64, f64) = (0.1, 10_000.0);
+const TURN_DEG: f64 = 360.0;
+
+/// Keys and units of linear axes or of tables.
+struct Words {
+    speed: (&'static str, &'static str),
+    speed_max: &'static str,
+    acceleration: (&'static str, &'static str),
+    quick_stop: &'static str,
+    lag: &'static str,
+    /// The unit of lag and window, and how many are one of the way.
+    fine: (&'static str, f64),
+    way: &'static str,
+}
+
+const LINEAR: Words = Words {
+    speed: ("speed_mm_per_s", "mm/s"),
+    speed_max: "speed_max_mm_per_s",
+    acceleration: ("acceleration_mm_per_s2", "mm/s²"),
+    quick_stop: "quick_stop_deceleration_mm_per_s2",
+    lag: "following_error_limit_um",
+    fine: ("µm", 1e3),
+    way: "mm",
+};
+
+const ROTARY: Words = Words {
+    speed: ("speed_deg_per_s", "°/s"),
+    speed_max: "speed_max_deg_per_s",
+    acceleration: ("acceleration_deg_per_s2", "°/s²"),
+    quick_stop: "quick_stop_deceleration_deg_per_s2",
+    lag: "following_error_limit_arcsec",
+    fine: ("″", 3600.0),
+    way: "°",
+};
+
+/// What is judged of any drive, in its own units.
+struct Motion {
+    words: &'static Words,
+    way: f64,
+    speed: f64,
+    speed_max: f64,
+    acceleration: f64,
+    quick_stop: f64,
+    lag: f64,
+    window: f64,
+}
+
+impl Motion {
+    const fn axis(axis: &AxisConfig) -> Self {
+        let motion = &axis.motion;
+        Self {
+            words: &LINEAR,
+            way: motion.soft_max_mm - motion.soft_min_mm,
+            speed: motion.speed_mm_per_s,
+            speed_max: motion.speed_max_mm_per_s,
+            acceleration: motion.acceleration_mm_per_s2,
+            quick_stop: motion.quick_stop_deceleration_mm_per_s2,
+            lag: motion.following_error_limit_um,
+            window: motion.position_window_um,
+        }
+    }
+
+    const fn table(table: &RotaryConfig) -> Self {
+        Self {
+            words: &ROTARY,
+            way: TURN_DEG,
+            speed: table.speed_deg_per_s,
+            speed_max: table.speed_max_deg_per_s,
+            acceleration: table.acceleration_deg_per_s2,
+            quick_stop: table.quick_stop_deceleration_deg_per_s2,
+            lag: table.following_error_limit_arcsec,
+            window: table.position_window_arcsec,
+        }
+    }
+
+    fn judge(&self, judge: &mut Judge<'_>) {
+        self.ramp(judge);
+        self.slow(judge);
+        self.fastest(judge);
+        self.hard_stop(judge);
+        self.lag(judge);
+    }
+
+    fn ramp(&self, judge: &mut Judge<'_>) {
+        let ramp_s = self.speed / self.acceleration;
+        if (RAMP_S.0..=RAMP_S.1).contains(&ramp_s) {
+            return;
+        }
+        let [(_, of_speed), (key, unit)] = [self.words.speed, self.words.acceleration];
+        let cause = format!(
+            "{} {of_speed} and {} {unit}: a ramp of {}",
+            Short(self.speed),
+            Short(self.acceleration),
+            span(ramp_s)
+        );
+        judge.say(
+            key,
+            cause,
+            format!(
+                "check it and {}: a ramp takes 0.01 to 1 s",
+                self.words.speed.0
+            ),
+        );
+    }
+
+    fn slow(&self, judge: &mut Judge<'_>) {
+        let least_s = least_time(self.way, self.speed, self.acceleration);
+        if least_s <= WAY_MAX_S {
+            return;
+        }
+        let (key, unit) = self.words.speed;
+        let cause = format!(
+            "the way of {} {} takes {} at {} {unit}",
+            Short(self.way),
+            self.words.way,
+            span(least_s),
+            Short(self.speed)
+        );
+        judge.say(key, cause, format!("check it: it is in {unit}"));
+    }
+
+    fn fastest(&self, judge: &mut Judge<'_>) {
+        if self.speed_max <= SPEEDS * self.speed {
+            return;
+        }
+        let (other, unit) = self.words.speed;
+        let cause = format!(
+            "{} {unit} are {:.0} times {other}, {} {unit}: what cannot be is hardly noticed",
+            Short(self.speed_max),
+            self.speed_max / self.speed,
+            Short(self.speed)
+        );
+        judge.say(
+            self.words.speed_max,
+            cause,
+            format!("check both: they are in {unit}"),
+        );
+    }
+
+    fn hard_stop(&self, judge: &mut Judge<'_>) {
+        if self.quick_stop < QUICK_STOPS * self.acceleration {
+            return;
+        }
+        let (_, unit) = self.words.acceleration;
+        let cause = format!(
+            "a quick stop slows down by {} {unit}, {:.0} times as hard as an ordinary move",
+            Short(self.quick_stop),
+            self.quick_stop / self.acceleration
+        );
+        judge.say(
+            self.words.quick_stop,
+            cause,
+            format!("check it: it is in {unit}; 2 to 20 times the acceleration is usual"),
+        );
+    }
+
+    fn lag(&self, judge: &mut Judge<'_>) {
+        let (unit, per_way) = self.words.fine;
+        let lag = Short(self.lag);
+        if self.lag < self.window {
+            let cause = format!(
+                "an error is raised {lag} {unit} off, and the position window is {} {unit}: a move may end with one",
+                Short(self.window)
+            );
+            let help = "give more than the position window, what a move may lag behind";
+            judge.say(self.words.lag, cause, help);
+        }
+        if self.lag > LAG_SHARE * self.way * per_way {
+            let (way, of_way) = (Short(self.way), self.words.way);
+            let cause = format!(
+                "{lag} {unit} are {} {of_way} of a way of {way} {of_way}: a drive that is stuck is hardly noticed",
+                Short(self.lag / per_way)
+            );
+            let help = format!("check it: it is in {unit}");
+            judge.say(self.words.lag, cause, help);
+        }
+    }
+}
+
+fn check_travel(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    let travel = motion.soft_max_mm - motion.soft_min_mm;
+    if !(TRAVEL_MM.0..=TRAVEL_MM.1).contains(&travel) {
+        let cause = format!(
+            "the soft limits {} and {} mm leave a travel of {} m",
+            Short(motion.soft_min_mm),
+            Short(motion.soft_max_mm),
+            Short(travel * 1e-3)
+        );
+        judge.say("soft_max_mm", cause, "check both: they are in millimetres");
+    }
+    let window_mm = motion.position_window_um * 1e-3;
+    if window_mm > WINDOW_SHARE * travel {
+        let cause = format!(
+            "the axis counts as there {} mm beside its target, of a travel of {} mm",
+            Short(window_mm),
+            Short(travel)
+        );
+        judge.say(
+            "position_window_um",
+            cause,
+            "check it: it is in micrometres",
+        );
+    }
+}
+
+pub(super) fn check(config: &MachineConfig, found: &mut Vec<Finding>) {
+    for (name, axis) in &config.axis {
+        let judge = &mut Judge::at(format!("axis.{name}"), found);
+        check_travel(judge, axis);
+        Motion::axis(axis).judge(judge);
+    }
+    for (name, table) in &config.rotary {
+        Motion::table(table).judge(&mut Judge::at(format!("rotary.{name}"), found));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::warnings::told::check;
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const ROTARY: &str = include_str!("../../../configs/machines/rotary.toml");
+    const UVW: &str = include_str!("../../../configs/machines/uvw.toml");
+
+    #[test]
+    fn a_ramp_that_no_drive_has_is_told() {
+        let key = "axis.u.acceleration_mm_per_s2";
+        let from = "acceleration_mm_per_s2 = 50.0";
+        let quick = (
+            "quick_stop_deceleration_mm_per_s2 = 500.0",
+            "quick_stop_deceleration_mm_per_s2 = 10000.0",
+        );
+        let edits = [quick, (from, "acceleration_mm_per_s2 = 10000.0")];
+        let says = "5 mm/s and 10000 mm/s²: a ramp of 500µs";
+        check(UVW, &edits, &[key], says);
+        let edits = [
+            (
+                "acceleration_deg_per_s2 = 180.0",
+                "acceleration_deg_per_s2 = 2.0",
+            ),
+            ("move_timeout_s = 60.0", "move_timeout_s = 90.0"),
+        ];
+        let says = "30 °/s and 2 °/s²: a ramp of 15s";
+        check(ROTARY, &edits, &["rotary.c.acceleration_deg_per_s2"], says);
+    }
+
+    #[test]
+    fn a_speed_that_is_no_speed_of_this_axis_is_told() {
+        let edits = [
+            ("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 0.2"),
+            (
+                "acceleration_mm_per_s2 = 5000.0",
+                "acceleration_mm_per_s2 = 50.0",
+            ),
+            ("move_timeout_s = 10.0", "move_timeout_s = 400.0"),
+            (
+                "quick_stop_deceleration_mm_per_s2 = 20000.0",
+                "quick_stop_deceleration_mm_per_s2 = 1000.0",
+            ),
+        ];
+        let says = "1000 mm/s are 5000 times speed_mm_per_s, 0.2 mm/s";
+        check(LINEAR, &edits, &["axis.x.speed_max_mm_per_s"], says);
+        let edits = [
+            ("\nspeed_deg_per_s = 30.0", "\nspeed_deg_per_s = 0.09"),
+            ("speed_max_deg_per_s = 180.0", "speed_max_deg_per_s = 60.0"),
+            (
+                "acceleration_deg_per_s2 = 180.0",
+                "acceleration_deg_per_s2 = 20.0",
+            ),
+            (
+                "quick_stop_deceleration_deg_per_s2 = 720.0",
+                "quick_stop_deceleration_deg_per_s2 = 72.0",
+            ),
+            ("move_timeout_s = 60.0", "move_timeout_s = 5000.0"),
+        ];
+        let says = "the way of 360 ° takes 4000s at 0.09 °/s";
+        check(ROTARY, &edits, &["rotary.c.speed_deg_per_s"], says);
+    }
+
+    #[test]
+    fn a_quick_stop_that_nothing_bears_is_told() {
+        let edit = (
+            "quick_stop_deceleration_mm_per_s2 = 500.0",
+            "quick_stop_deceleration_mm_per_s2 = 50000.0",
+        );
+        let key = "axis.u.quick_stop_deceleration_mm_per_s2";
+        let says = "by 50000 mm/s², 1000 times as hard";
+        // Counts of 10 nm: beyond the drive's 32 bits it is refused.
+        let edits = [("resolution_nm = 10.0", "resolution_nm = 50.0"), edit];
+        check(UVW, &edits, &[key], says);
+    }
+
+    #[test]
+    fn following_errors_that_are_never_or_always_there_are_told() {
+        let key = "axis.u.following_error_limit_um";
+        let from = "following_error_limit_um = 200.0";
+        let edit = (from, "following_error_limit_um = 0.05");
+        check(
+            UVW,
+            &[edit],
+            &[key],
+            "0.05 µm off, and the position window is 0.1 µm",
+        );
+        let edit = (from, "following_error_limit_um = 2000.0");
+        check(UVW, &[edit], &[key], "2000 µm are 2 mm of a way of 9 mm");
+        let from = "following_error_limit_arcsec = 600.0";
+        let edit = (from, "following_error_limit_arcsec = 600000.0");
+        let key = "rotary.c.following_error_limit_arcsec";
+        check(ROTARY, &[edit], &[key], "of a way of 360 °");
+    }
+
+    #[test]
+    fn travels_of_metres_and_windows_of_millimetres_are_told() {
+        let edits = [
+            ("soft_max_mm = 63.0", "soft_max_mm = 19000.0"),
+            ("move_timeout_s = 10.0", "move_timeout_s = 200.0"),
+            ("end_mm = 60.0", "end_mm = 18000.0"),
+            ("step_mm = 3.0", "step_mm = 900.0"),
+            ("start_mm = 1.7 ", "start_mm = 451.7 "),
+            ("end_mm = 58.7", "end_mm = 17450.0"),
+            ("targets = 8", "targets = 18"),
+        ];
+        let says = "-3 and 19000 mm leave a travel of 19.003 m";
+        check(LINEAR, &edits, &["axis.x.soft_max_mm"], says);
+        let edit = ("position_window_um = 0.1", "position_window_um = 100.0");
+        let keys = ["axis.u.position_window_um", "platform.verify.tolerance_um"];
+        check(UVW, &[edit], &keys, "screw u counts as there 100 µm");
+    }
+}
