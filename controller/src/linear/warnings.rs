@@ -1,5 +1,9 @@
 //! What is doubtful of linear axes that are sound.
 
+mod accuracy;
+mod gantry;
+mod zero;
+
 use machine::Stage;
 use units::{Metres, Short, ShortSpan};
 
@@ -28,8 +32,12 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
             check_duration(judge, axis, stage);
         }
         check_between(judge, axis);
+        zero::check(judge, config, axis);
+        accuracy::check(judge, config, axis);
         check_corrections(found, config, (name, axis));
+        accuracy::check_instrument(found, config, (name, axis));
     }
+    gantry::check(config, found);
 }
 
 fn check_window(judge: &mut Judge<'_>, axis: &AxisConfig) {
