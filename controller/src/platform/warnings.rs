@@ -1,5 +1,8 @@
 //! What is doubtful of a platform that is sound.
 
+mod reach;
+mod screw;
+
 use core::time::Duration;
 
 use units::{Short, ShortSpan};
@@ -15,6 +18,8 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(platform) = &config.platform else {
         return;
     };
+    reach::check(found, config, platform);
+    screw::check(found, config, platform);
     let judge = &mut Judge::at("platform".into(), found);
     check_duration(judge, platform);
     let tolerance = platform.verify.as_ref().map(|it| it.tolerance_um);

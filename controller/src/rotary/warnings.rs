@@ -4,16 +4,95 @@ use units::Short;
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::rotary::RotaryConfig;
+use crate::config::least_time::span;
+use crate::rotary::{RotaryCalibrateConfig, RotaryConfig};
 
 const TURN_ARCSEC: f64 = 1_296_000.0;
 /// Fewer counts than this within which a table must stand: it never does, when its last digit flickers.
 const WINDOW_COUNTS: f64 = 2.0;
+/// Longer than a shift.
+const RUN_MAX_S: f64 = 8.0 * 3600.0;
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     for (name, table) in &config.rotary {
         let judge = &mut Judge::at(format!("rotary.{name}"), found);
         check_window(judge, table);
+        check_tolerance(judge, table);
+        if let Some(run) = &table.calibrate {
+            check_run(judge, table, run);
+        }
+    }
+}
+
+/// What a table is to reach, against what it counts, what is corrected and what is read.
+fn check_tolerance(judge: &mut Judge<'_>, table: &RotaryConfig) {
+    let Some(tolerance) = table.verify.as_ref().map(|it| it.tolerance_arcsec) else {
+        return;
+    };
+    let count = TURN_ARCSEC / f64::from(table.counts_per_turn);
+    if tolerance < count {
+        judge.say(
+            "verify.tolerance_arcsec",
+            format!(
+                "{}″ are less than one count of {}″",
+                Short(tolerance),
+                Short(count)
+            ),
+            "check it: it is in seconds of arc",
+        );
+    }
+    let size = table.compensation.as_ref().map(|it| it.size_limit_arcsec);
+    if let Some(size) = size.filter(|it| tolerance > *it) {
+        judge.say(
+            "verify.tolerance_arcsec",
+            format!(
+                "{}″ are more than the errors that are corrected, {}″ (size_limit_arcsec): any table reaches that",
+                Short(tolerance),
+                Short(size)
+            ),
+            "check it: it is in seconds of arc",
+        );
+    }
+    let noise = table.calibrate.as_ref().map(|it| it.reading_noise_arcsec);
+    if let Some(noise) = noise.filter(|it| *it > tolerance) {
+        judge.say(
+            "calibrate.reading_noise_arcsec",
+            format!(
+                "a line is read to {}″, and tolerance_arcsec is {}: the scatter of the readings is in what is verified",
+                Short(noise),
+                Short(tolerance)
+            ),
+            "check both: they are in seconds of arc",
+        );
+    }
+}
+
+fn check_run(judge: &mut Judge<'_>, table: &RotaryConfig, run: &RotaryCalibrateConfig) {
+    let size = table.compensation.as_ref().map(|it| it.size_limit_arcsec);
+    if let Some(size) = size.filter(|it| run.closure_limit_arcsec > *it) {
+        judge.say(
+            "calibrate.closure_limit_arcsec",
+            format!(
+                "lines may move by {}″ while they are read, and errors are corrected up to {}″ (size_limit_arcsec)",
+                Short(run.closure_limit_arcsec),
+                Short(size)
+            ),
+            "give a fraction of what the table is to reach",
+        );
+    }
+    if !table.is_driven() {
+        return;
+    }
+    let placements = run.offsets.as_ref().map_or(0, Vec::len);
+    let placements = run.placements.unwrap_or(placements as u32);
+    let turns = 2.0 * f64::from(run.passes) * f64::from(placements);
+    let all_s = turns * 360.0 / run.speed_deg_per_s.unwrap_or(table.speed_deg_per_s);
+    if all_s > RUN_MAX_S {
+        judge.say(
+            "calibrate.passes",
+            format!("{turns:.0} turns over the plate take {}", span(all_s)),
+            "check passes, placements and speed_deg_per_s",
+        );
     }
 }
 
@@ -72,5 +151,24 @@ mod tests {
             &[key],
             says,
         );
+    }
+
+    #[test]
+    fn what_a_table_is_to_reach_is_judged_by_what_is_corrected_and_read() {
+        let from = "tolerance_arcsec = 0.3";
+        let key = "rotary.c.verify.tolerance_arcsec";
+        let edit = (from, "tolerance_arcsec = 300.0");
+        let says = "300″ are more than the errors that are corrected, 60″";
+        check(ROTARY, &[edit], &[key], says);
+        let edit = ("noise_arcsec = 0.06", "noise_arcsec = 60.0");
+        let key = "rotary.c.calibrate.reading_noise_arcsec";
+        let says = "a line is read to 60″, and tolerance_arcsec is 0.3";
+        check(ROTARY, &[edit], &[key], says);
+        let edit = ("limit_arcsec = 0.1", "limit_arcsec = 100.0");
+        let key = "rotary.c.calibrate.closure_limit_arcsec";
+        check(ROTARY, &[edit], &[key], "may move by 100″");
+        let edit = ("passes = 1  ", "passes = 1000  ");
+        let says = "8000 turns over the plate take 48000s";
+        check(ROTARY, &[edit], &["rotary.c.calibrate.passes"], says);
     }
 }
