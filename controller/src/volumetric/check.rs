@@ -1,6 +1,6 @@
 //! Whether three axes that are corrected throughout their volume make sense as described.
 
-mod detectors;
+pub(crate) mod detectors;
 
 use units::Short;
 

@@ -1,5 +1,8 @@
 //! What is doubtful of three axes that are sound.
 
+mod detectors;
+mod volume;
+
 use compensator::volumetric::Axis;
 use units::{Metres, Short};
 
@@ -14,6 +17,8 @@ pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(volume) = &config.volumetric else {
         return;
     };
+    volume::check(found, config, volume);
+    detectors::check(found, config, volume);
     let Some(own) = &volume.calibrate else {
         return;
     };

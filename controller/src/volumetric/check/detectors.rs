@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use units::Short;
+
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AnalogConfig, MachineConfig};
 use crate::hardware::camera::CameraConfig;
@@ -221,10 +223,48 @@ fn check_detector<'a>(
         }
         check_age(judge, config, analog, detector.age_max_ms);
     }
+    check_light(judge, detector);
     if let Err(error) = settings::beam_detector(detector) {
         let help = "configs/README.md describes every key of a beam detector";
         judge.say("", error.to_string(), help);
     }
+}
+
+/// Four channels short of saturation must be able to show a beam.
+fn check_light(judge: &mut Judge<'_>, detector: &BeamDetectorConfig) {
+    let saturation_v = detector.saturation_v;
+    let dark_mv = detector.dark_mv.iter().copied().fold(0.0, f64::max);
+    if saturation_v > 0.0 && dark_mv * 1e-3 >= saturation_v {
+        return judge.say(
+            "dark_mv",
+            format!(
+                "a channel gives {} mV in the dark, and is saturated at {} V",
+                Short(dark_mv),
+                Short(saturation_v)
+            ),
+            "give what it shows with the beam covered, in millivolts",
+        );
+    }
+    let brightest_v = brightest_v(detector);
+    if brightest_v > 0.0 && detector.intensity_min_v >= brightest_v {
+        judge.say(
+            "intensity_min_v",
+            format!(
+                "four channels below saturation_v never come to {} V together: {} V at most, and the beam would always \
+                 count as blocked",
+                Short(detector.intensity_min_v),
+                Short(brightest_v)
+            ),
+            "give half of the sum that the beam gives, in volts",
+        );
+    }
+}
+
+/// The largest sum of the four channels, none of them saturated.
+pub(crate) fn brightest_v(detector: &BeamDetectorConfig) -> f64 {
+    let channels = detector.dark_mv.iter().zip(detector.gain);
+    let channels = channels.map(|(dark, gain)| (detector.saturation_v - dark * 1e-3) * gain);
+    channels.sum()
 }
 
 /// A converter at its end must count as saturated.
@@ -347,4 +387,23 @@ fn check_temperature<'a>(
         check_age(judge, config, analog, temperature.age_max_ms);
     }
     judge.below(("low_c", temperature.low_c), ("high_c", temperature.high_c));
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::validate::told::check;
+
+    #[test]
+    fn light_that_no_channels_show_is_found_where_it_stands() {
+        let volumetric = include_str!("../../../../configs/machines/volumetric.toml");
+        let from = "intensity_min_v = 5.0\nintensity_max_v = 11.0";
+        let to = "intensity_min_v = 5000.0\nintensity_max_v = 11000.0";
+        let key = "volumetric.beam.x.slider.intensity_min_v";
+        let says = "never come to 5000 V together: 12.8 V at most";
+        check(volumetric, from, to, key, says);
+        let to = &format!("{from}\ndark_mv = [0.0, 4000.0, 0.0, 0.0]");
+        let key = "volumetric.beam.x.slider.dark_mv";
+        let says = "4000 mV in the dark, and is saturated at 3.2 V";
+        check(volumetric, from, to, key, says);
+    }
 }
