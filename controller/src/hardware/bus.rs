@@ -63,6 +63,7 @@ pub struct CanBus {
 #[serde(deny_unknown_fields)]
 pub struct SerialLine {
     /// The device; `/dev/serial/by-id/...` survives replugging.
+    #[schemars(extend("x-range" = "not empty"))]
     #[schemars(extend("x-own" = true))]
     pub path: PathBuf,
     /// Baud rate.

@@ -94,7 +94,7 @@ pub struct RotaryConfig {
     #[schemars(extend("x-own" = true))]
     pub quick_stop_deceleration_deg_per_s2: f64,
     /// Following error window (0x6065).
-    #[schemars(range(min = 0.001, max = 1000000.0))]
+    #[schemars(range(min = 0.001, max = 1000000.0), extend("x-range" = "at least one count"))]
     pub following_error_limit_arcsec: f64,
     /// For how long it may be exceeded (0x6066).
     pub following_error_timeout_ms: u16,

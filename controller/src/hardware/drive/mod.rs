@@ -123,7 +123,7 @@ pub struct MotionConfig {
     #[schemars(extend("x-own" = true))]
     pub quick_stop_deceleration_mm_per_s2: f64,
     /// Following error window (0x6065; 0xba).
-    #[schemars(range(min = 0.001, max = 100000.0))]
+    #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at least one count"))]
     pub following_error_limit_um: f64,
     /// How near its target the axis must be (0x6067; 0xbc).
     #[schemars(range(min = 0.0001, max = 10000.0))]
