@@ -169,7 +169,7 @@ fn read_by<C: DeserializeOwned>(
             }
         }
     };
-    let (document, quoted) = structure::unquoted(document, schema);
+    let (document, regrouped) = structure::regrouped(document, schema);
     let unread = Unread {
         keys: &recovered.unread,
         cut_short: &recovered.cut_short,
@@ -177,7 +177,7 @@ fn read_by<C: DeserializeOwned>(
     };
     let found = structure::judge((&document, &recovered.text), schema, unread);
     let (mut findings, repairs) = (found.findings, found.repairs);
-    findings.extend(quoted);
+    findings.extend(regrouped);
     let config = Value::Table(repaired(document, &repairs)).try_into::<C>();
     let is_sound = findings.is_empty() && recovered.findings.is_empty();
     let config = match config {

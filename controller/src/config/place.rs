@@ -30,7 +30,13 @@ pub(super) fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>>
         return Some(name.span());
     }
     while let Some(own) = parts.next() {
-        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref() == own) else {
+        let exact = table.iter().find(|(name, _)| name.get_ref() == own);
+        // What is in capitals is told as what it was meant to be.
+        let alike = || {
+            let mut names = table.iter();
+            names.find(|(name, _)| name.get_ref().eq_ignore_ascii_case(own))
+        };
+        let Some((name, value)) = exact.or_else(alike) else {
             break;
         };
         span = Some(match value.get_ref() {

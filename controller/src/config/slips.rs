@@ -21,6 +21,8 @@ pub(super) struct Slip {
     pub(super) meant: Option<String>,
     /// Whether it was taken for a text without quotes, which may have been meant to be something else.
     pub(super) is_text: bool,
+    /// Whether nothing more can be told than that it cannot be read.
+    is_unknown: bool,
     /// Whether it can be meant in two ways, both of which are told.
     pub(super) is_ambiguous: bool,
     /// Whether it is a remark that does not begin as one.
@@ -39,6 +41,7 @@ impl Slip {
             help,
             meant,
             is_text: false,
+            is_unknown: false,
             is_ambiguous: false,
             is_comment: false,
             is_lost_heading: false,
@@ -67,7 +70,10 @@ pub(super) fn of_line(line: &str, at: usize) -> Slip {
 fn nothing_known(parts: &Parts<'_>) -> Slip {
     let cause = format!("`{}` cannot be read", shown(parts.said.trim()));
     let help = "remove it, or begin it with #; a line is `key = value`, `[section]`, or a comment";
-    Slip::new(0, cause, help.into(), None)
+    Slip {
+        is_unknown: true,
+        ..Slip::new(0, cause, help.into(), None)
+    }
 }
 
 /// What a value that goes on over further lines ends with.
@@ -84,7 +90,9 @@ pub(super) fn goes_on(line: &str) -> Option<End> {
     let is_open = |open, close| {
         value.starts_with(open) && value.matches(open).count() > value.matches(close).count()
     };
-    if is_toml(line) {
+    // `axis.x = {` was meant to begin a section.
+    let is_heading = value == "{" && line.split('=').next().is_some_and(|it| it.contains('.'));
+    if is_heading || is_toml(line) {
         return None;
     }
     let is_text = ["\"\"\"", "'''"].iter().any(|it| value.starts_with(it));
@@ -207,7 +215,8 @@ fn comment(parts: &Parts<'_>) -> Option<Slip> {
     if let Some(sign) = COMMENTS.iter().find(|it| line.starts_with(**it)) {
         return Some(no_comment(sign, begin, String::new()));
     }
-    if line.starts_with('\'') && parts.value.is_none() {
+    let is_begun = line.strip_prefix('\'').is_some_and(|it| !it.contains('\''));
+    if is_begun && parts.value.is_none() {
         return Some(no_comment("'", begin, String::new()));
     }
     let value = parts.value?;
@@ -244,7 +253,8 @@ fn two_keys(parts: &Parts<'_>) -> Option<Slip> {
     let (at, last) = last.find(|(_, it)| !is_name(*it))?;
     let begin = at + last.len_utf8();
     let (first, second) = before.split_at(begin);
-    let first = first.trim().trim_end_matches([',', ';']).trim_end();
+    let first = first.trim().trim_end_matches([',', ';', '&']).trim_end();
+    let first = first.strip_suffix(" and").unwrap_or(first).trim_end();
     let meant = parts.with(first);
     let is_told = !second.is_empty() && !first.is_empty() && is_toml(&meant);
     is_told.then(|| {

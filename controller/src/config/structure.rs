@@ -2,6 +2,7 @@
 
 mod named;
 mod places;
+mod regrouped;
 mod section;
 mod unknown;
 mod written;
@@ -17,15 +18,17 @@ use super::judge::Finding;
 use super::lines::below;
 use super::meant::word_meant;
 use super::place::{Part, span_of};
-use super::repair::{Repair, join};
+use super::repair::Repair;
 use super::schema::{DEVICE, type_of, without_null};
 use named::named;
+pub(super) use regrouped::regrouped;
 use section::Section;
 use unknown::{merged, orphans, tell_orphans, unknown};
-use written::{converted, correction, in_words, kind};
+pub(super) use written::in_words;
+use written::{converted, correction, kind};
 
 /// What was found, by keys, and which part of each it is.
-type Findings = Vec<(Finding, Part)>;
+pub(super) type Findings = Vec<(Finding, Part)>;
 
 /// What is there and cannot be read: it is not missing.
 #[derive(Clone, Copy, Default)]
@@ -117,37 +120,6 @@ pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
     };
     any("", value, schema, &mut found);
     found.findings.is_empty()
-}
-
-/// `["axis.x"]` is one name with a point in it: such sections are put where they were meant to be.
-pub(super) fn unquoted(document: Table, schema: &Schema) -> (Table, Findings) {
-    let is_meant = |name: &str, value: &Value| {
-        let first = name.split_once('.').map(|it| it.0);
-        value.is_table() && first.is_some_and(|it| schema["properties"].get(it).is_some())
-    };
-    let (quoted, mut document): (Table, Table) = document
-        .into_iter()
-        .partition(|(name, value)| is_meant(name, value));
-    let mut findings = Findings::new();
-    for (name, value) in quoted {
-        let nested = name.rsplit('.').fold(value, |inner, part| {
-            let mut table = Table::new();
-            table.insert(part.to_owned(), inner);
-            Value::Table(table)
-        });
-        if let Value::Table(nested) = nested {
-            join(&mut document, nested);
-        }
-        let cause = "the quotation marks make one name of it".to_owned();
-        let help = format!("write `[{name}]`");
-        let finding = Finding {
-            key: name,
-            cause,
-            help,
-        };
-        findings.push((finding, Part::Name));
-    }
-    (document, findings)
 }
 
 fn say(found: &mut Found<'_>, key: &str, cause: String, help: String) {
@@ -293,6 +265,20 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
         );
         return;
     }
+    let is_number = matches!(type_of(&schema["items"]), "number" | "integer");
+    if is_number && items.len() > 1 && items.iter().all(Value::is_str) {
+        let written = found.as_written(path).unwrap_or_default();
+        let bare: String = written.chars().filter(|it| !"\"'".contains(*it)).collect();
+        if takes_text(&bare, schema) {
+            let cause = "expected numbers here, these are texts".to_owned();
+            return say(
+                found,
+                path,
+                cause,
+                format!("write them without quotes: {bare}"),
+            );
+        }
+    }
     for (at, item) in items.iter().enumerate() {
         // Numbers of a list are found where the list is; its sections each by themselves.
         let own = match item {
@@ -306,6 +292,11 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
             number(&own, seen, schema, found);
         }
     }
+}
+
+fn takes_text(value: &str, schema: &Schema) -> bool {
+    let document = format!("it = {value}").parse::<Table>();
+    document.is_ok_and(|it| it.values().all(|it| takes(schema, it)))
 }
 
 /// Whether it may be `[0,5, 1,5]` for `[0.5, 1.5]`.

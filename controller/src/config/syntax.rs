@@ -48,11 +48,13 @@ impl Recovered {
     /// What is wrong with the line, which is the `number`th.
     fn note(&mut self, slip: &Slip, section: &Section, (line, number): (&str, usize), file: &str) {
         let read = slip.meant.as_deref().filter(|it| it.contains('='));
+        let is_heading = slip.meant.as_deref().is_some_and(|it| it.starts_with('['));
         let key = match &slip.key {
             Some(key) => below(&section.path, key),
+            None if is_heading => section.path.clone(),
             None => section.key(read.unwrap_or(line)),
         };
-        if slip.meant.is_none() && !key.is_empty() {
+        if (slip.meant.is_none() || slip.key.is_some()) && !key.is_empty() {
             self.unread.push(key.clone());
         }
         self.has_lost_heading |= slip.is_lost_heading;

@@ -14,6 +14,7 @@ pub(super) fn check(config: &MachineConfig, found: &mut Vec<Finding>) {
         check_path(&mut Judge::at(key, found), "path", path);
     }
     let judge = &mut Judge::at("machine".into(), found);
+    check_serial(judge, &config.machine.stage_serial);
     check_path(judge, "data_dir", &config.machine.data_dir);
     check_folder(judge, &config.machine.data_dir);
 }
@@ -31,12 +32,69 @@ fn check_path(judge: &mut Judge<'_>, key: &str, path: &Path) {
             format!("write \"{trimmed}\""),
         );
     }
+    check_letters(judge, key, trimmed);
+    let port = trimmed.strip_prefix("COM").unwrap_or_default();
+    if !port.is_empty() && port.chars().all(|it| it.is_ascii_digit()) {
+        let cause = format!("\"{trimmed}\" is a port's name on Windows");
+        judge.say(
+            key,
+            cause,
+            "write the device file: /dev/ttyUSB0, /dev/serial/by-id/…",
+        );
+    }
     if trimmed.starts_with('~') || trimmed.contains('$') {
         judge.say(
             key,
             format!("\"{text}\" is taken as it stands: `~` and `$` mean nothing in this file"),
             "write the whole path",
         );
+    }
+}
+
+/// Words that stand for what somebody still has to find out.
+const PLACEHOLDERS: [&str; 7] = [
+    "todo",
+    "fixme",
+    "changeme",
+    "tbd",
+    "xxx",
+    "unknown",
+    "yourserial",
+];
+
+fn check_serial(judge: &mut Judge<'_>, serial: &str) {
+    let letters = serial.chars().filter(|it| it.is_alphanumeric());
+    let letters: String = letters.flat_map(char::to_lowercase).collect();
+    if PLACEHOLDERS.contains(&letters.as_str()) {
+        judge.say(
+            "stage_serial",
+            format!("\"{serial}\" is a word that stands for a number"),
+            "give the serial number on the stage's plate",
+        );
+    }
+    check_letters(judge, "stage_serial", serial);
+}
+
+/// Letters that look like others, marks within marks, blanks at an end.
+fn check_letters(judge: &mut Judge<'_>, key: &str, text: &str) {
+    if let Some(it) = text.chars().find(|it| !it.is_ascii()) {
+        let cause = format!(
+            "\"{text}\" has a `{it}` that is none of the keyboard's (U+{:04X})",
+            u32::from(it)
+        );
+        judge.say(
+            key,
+            cause,
+            "type it anew, if it was meant to be the letter that it looks like",
+        );
+    }
+    if text.contains(['"', '\'']) {
+        let cause = format!("the quotation marks in {text} are part of it");
+        judge.say(key, cause, "remove those within it");
+    }
+    if key == "stage_serial" && text.trim().len() < text.len() {
+        let cause = format!("\"{text}\" begins or ends with a blank, which is part of it");
+        judge.say(key, cause, format!("write \"{}\"", text.trim()));
     }
 }
 
@@ -78,5 +136,26 @@ mod tests {
         let edit = ("\"/dev/ttyACM0\"", "\" /dev/ttyACM0\"");
         let says = "\" /dev/ttyACM0\" begins or ends with a blank";
         check(LINEAR, &[edit], &["serial.laser.path"], says);
+    }
+
+    #[test]
+    fn a_text_that_says_something_else_than_it_seems_to_is_told() {
+        let (from, key) = ("stage_serial = \"TS-LIN-0001\"", "machine.stage_serial");
+        for (to, says) in [
+            ("\"CHANGE-ME\"", "stands for a number"),
+            ("\"ТS-LIN-0001\"", "none of the keyboard's (U+0422)"),
+            ("'\"TS-LIN-0001\"'", "are part of it"),
+            ("\"TS-LIN-0001 \"", "ends with a blank"),
+        ] {
+            let edit = (from, &*format!("stage_serial = {to}"));
+            check(LINEAR, &[edit], &[key], says);
+        }
+        let edit = ("\"/dev/ttyACM1\"", "\"COM3\"");
+        check(
+            LINEAR,
+            &[edit],
+            &["can.can0.path"],
+            "a port's name on Windows",
+        );
     }
 }

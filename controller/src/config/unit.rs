@@ -33,16 +33,23 @@ pub(super) fn is_unit(text: &str) -> bool {
         && text[1..].starts_with(|it: char| it.is_ascii_hexdigit());
     let is_rest = |it: char| it.is_alphanumeric() || "/°²³%″′^".contains(it);
     // A letter that looks like a digit is one; digits are exponents.
-    let is_digit = ["l", "I", "O", "o"].contains(&text);
-    let digits = text.matches(|it: char| it.is_ascii_digit() && !"23".contains(it));
-    begins && !is_prefix && !is_digit && digits.count() == 0 && text.chars().all(is_rest)
+    let is_digit = ["l", "I", "O", "o", "S", "B"].contains(&text);
+    let has_digits = text.contains(|it: char| it.is_ascii_digit());
+    let is_known = !has_digits || size(&text.replace('^', "")).is_some();
+    begins && !is_prefix && !is_digit && is_known && text.chars().all(is_rest)
+}
+
+/// Whether it is one of the units that keys end with, or another of the same quantities.
+pub(super) fn is_known(unit: &str) -> bool {
+    size(unit).is_some()
 }
 
 /// `number` of `unit` in the unit that `key` ends with: 0.05 mm are 50.0 of `position_window_um`.
 pub(super) fn converted(number: &str, unit: &str, key: &str) -> Option<String> {
     let unit = unit.replace('²', "2").replace('³', "3").replace('^', "");
     let written = size(&unit)?;
-    let wanted = unit_of(key)?;
+    // A share has no unit.
+    let wanted = unit_of(key).or_else(|| (unit == "%").then(|| ("share".to_owned(), 1.0)))?;
     if written.0 != wanted.0 {
         return None;
     }
@@ -85,6 +92,8 @@ fn size(unit: &str) -> Option<(String, f64)> {
         "h" | "hr" => ("time", 3600.0),
         "s2" => ("time2", 1.0),
         "s3" => ("time3", 1.0),
+        "%" | "percent" => ("share", 1e-2),
+        "ppm" => ("share", 1e-6),
         "V" | "v" => ("voltage", 1.0),
         "mV" | "mv" => ("voltage", 1e-3),
         "deg" | "°" => ("angle", 3600.0 * ARC_SECOND),

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::Value as Schema;
 use toml::{Table, Value};
 
+use super::schema::type_of;
 use super::structure;
 
 /// The keys of a section, each with what it can be. Where the section is about one of several devices, those of all.
 pub(super) struct Wanted<'a> {
+    path: String,
     keys: BTreeMap<&'a str, Vec<&'a Schema>>,
 }
 
@@ -25,7 +27,17 @@ impl<'a> Wanted<'a> {
         for (key, own) in nodes.flat_map(|it| it["properties"].as_object().into_iter().flatten()) {
             keys.entry(key).or_default().push(own);
         }
-        Self { keys }
+        let path = path.to_owned();
+        Self { path, keys }
+    }
+
+    /// The path of the section in this one that is called `name`, where there is such a one.
+    pub(super) fn section(&self, name: &str) -> Option<String> {
+        let is_section = |it: &&Schema| it["properties"].is_object();
+        self.ways(name).iter().find(|it| is_section(it))?;
+        // One of several is named by what stands before it.
+        let is_of_several = self.path.split('.').any(|it| it.parse::<usize>().is_ok());
+        (!is_of_several).then(|| super::lines::below(&self.path, name))
     }
 
     pub(super) fn keys(&self) -> Vec<&'a str> {
@@ -52,6 +64,31 @@ impl<'a> Wanted<'a> {
             (Some((key, value)), None) => self.takes_value(key, value),
             _ => false,
         }
+    }
+
+    /// What `key` is, in words, where it is known.
+    pub(super) fn can_be(&self, key: &str) -> Option<&'static str> {
+        let mut kinds = self.ways(key).into_iter().map(type_of);
+        kinds.next_back().map(structure::in_words)
+    }
+
+    /// Whether the value of `line` is of a kind that its key has, of whatever size.
+    pub(super) fn fits_kind(&self, line: &str) -> bool {
+        let table = line.parse::<Table>().unwrap_or_default();
+        let Some((key, value)) = table.iter().next() else {
+            return false;
+        };
+        let kind = match value {
+            Value::Float(it) if it.fract() != 0.0 => &["number"][..],
+            Value::Float(_) | Value::Integer(_) => &["number", "integer"],
+            Value::String(_) => &["string"],
+            Value::Boolean(_) => &["boolean"],
+            Value::Array(_) => &["array"],
+            Value::Table(_) | Value::Datetime(_) => &["object"],
+        };
+        self.ways(key)
+            .into_iter()
+            .any(|it| kind.contains(&type_of(it)))
     }
 
     fn takes_value(&self, key: &str, value: &Value) -> bool {

@@ -78,9 +78,11 @@ pub(super) fn look_alike(parts: &Parts<'_>) -> Option<Slip> {
         return None;
     }
     let line = shown(replaced.trim());
-    let value = replaced
-        .split_once('=')
-        .map_or(line.clone(), |it| shown(it.1.trim()));
+    let parted = replaced.split_once('=');
+    let value = match parted.filter(|it| at > it.0.len()) {
+        Some((_, value)) => shown(value.trim()),
+        None => format!("`{line}`"),
+    };
     let (cause, help) = match kind {
         Meant::Quote => (
             format!("`{it}` is a quotation mark of printed text"),

@@ -33,7 +33,12 @@ impl<'a> Heading<'a> {
             return None;
         }
         let inner = bare.trim_start_matches(OPEN);
-        if inner.contains(OPEN) {
+        let index = inner.find('[').filter(|_| bare.starts_with('['));
+        let inner = index.map_or(inner, |at| &inner[..at]);
+        // Words behind it, or in round brackets, are a remark.
+        let behind = bare.rsplit(CLOSED).next().unwrap_or_default().trim();
+        let is_remark = bare.starts_with('(') && (inner.contains(' ') || !behind.is_empty());
+        if inner.contains(OPEN) || is_remark {
             return None;
         }
         let name = inner.split(CLOSED).next().unwrap_or_default();
@@ -59,7 +64,7 @@ impl<'a> Heading<'a> {
         let help =
             format!("write `{meant}`: a section's name stands in brackets, its parts with points");
         // Words in other brackets may be a remark: what follows stays where it is.
-        let is_remark = !self.line.starts_with('[') && self.line.contains(' ');
+        let is_remark = self.line.starts_with(['(', '<']) && self.line.contains(' ');
         let meant = Some(meant).filter(|_| !is_remark);
         Some(Slip::new(self.at, cause, help, meant))
     }
@@ -68,17 +73,34 @@ impl<'a> Heading<'a> {
 /// A line without what ends one elsewhere.
 fn bare<'a>(parts: &Parts<'a>) -> &'a str {
     let line = parts.said.trim();
-    line.trim_end_matches(['=', ':', ',', ';', '.', ' '])
+    let is_quoted = line.starts_with("\"[") || line.starts_with("'[");
+    let line = if is_quoted {
+        line.trim_matches(QUOTES)
+    } else {
+        line
+    };
+    let line = line.trim_end_matches(['=', ':', ',', ';', '.', ' ', '{']);
+    // A word, or a list's mark, before the bracket.
+    match line.find('[') {
+        Some(at)
+            if line.ends_with(']') && !line[..at].contains(['=', '.', ':', '"', '\'', '＝']) =>
+        {
+            &line[at..]
+        }
+        _ => line,
+    }
 }
 
 /// A name of several parts without any brackets, of which the first is known.
 fn without_brackets<'a>(parts: &Parts<'a>, schema: &Schema) -> Option<Heading<'a>> {
     let heading = Heading::named(parts)?;
     let first = heading.parts.first()?;
-    let is_ended = parts.said.trim().ends_with(':');
-    let is_name = (heading.parts.len() > 1 || is_ended) && !bare(parts).contains([' ', ':', ',']);
+    let is_ended = parts.said.trim().ends_with([':', '{']);
+    let is_name =
+        (heading.parts.len() > 1 || is_ended) && !bare(parts).contains([' ', ':', ',', ';']);
     let is_known = schema["properties"].get(*first).is_some();
-    (is_name && is_known && parts.value.is_none()).then_some(heading)
+    let has_no_value = parts.value.is_none_or(|it| it.is_empty() || it == "{");
+    (is_name && is_known && has_no_value).then_some(heading)
 }
 
 pub(super) fn of_line(parts: &Parts<'_>) -> Option<Slip> {
@@ -92,11 +114,17 @@ pub(super) fn of_line(parts: &Parts<'_>) -> Option<Slip> {
 /// Likewise where the schema tells what sections there are; one that begins like none of them is none.
 pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> {
     let parts = Parts::of(line);
+    if let Some(slip) = with_a_key(line) {
+        return Some(slip);
+    }
     let heading = Heading::of(&parts).or_else(|| without_brackets(&parts, schema))?;
     if heading.parts.is_empty() && heading.line != "[]" {
         return None;
     }
-    if let Some(name) = section_meant(schema, &heading.parts) {
+    let without_first = heading.parts.get(1..).unwrap_or_default();
+    let name =
+        section_meant(schema, &heading.parts).or_else(|| section_meant(schema, without_first));
+    if let Some(name) = name {
         let is_list = is_list(schema, &name);
         return Heading { is_list, ..heading }.told(&name);
     }
@@ -111,5 +139,26 @@ pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> 
     Some(Slip {
         is_lost_heading,
         ..Slip::new(heading.at, cause, help, None)
+    })
+}
+
+/// A key on the line of the heading.
+fn with_a_key(line: &str) -> Option<Slip> {
+    let line = line.trim();
+    let end = line.find(']')? + 1;
+    let end = end + line[end..].len() - line[end..].trim_start_matches(']').len();
+    let (heading, rest) = line.split_at(end);
+    let key = rest.split_once('=')?.0.trim();
+    if !line.starts_with('[') || !is_toml(heading) || !super::is_key(key) {
+        return None;
+    }
+    let cause = format!(
+        "the key `{}` begins on the line of a section's name",
+        shown(key)
+    );
+    let help = format!("begin a new line before `{}`", shown(key));
+    Some(Slip {
+        key: Some(key.to_owned()),
+        ..Slip::new(end, cause, help, Some(heading.to_owned()))
     })
 }

@@ -6,6 +6,7 @@ use toml::Table;
 use super::{Parts, Slip, is_key, is_toml, loosely, nothing_known};
 use crate::config::diagnostic::shown;
 use crate::config::meant::key_meant;
+use crate::config::unit::is_known;
 use crate::config::wanted::Wanted;
 
 /// What is wrong with `line`; `at` is where the reader of TOML stopped.
@@ -23,7 +24,9 @@ pub(in crate::config) fn of_line(line: &str, at: usize, wanted: &Wanted<'_>) -> 
     if slip.is_ambiguous {
         return of_two(slip, &parts, wanted);
     }
-    joined_heading(&parts, wanted)
+    subsection(&parts, wanted)
+        .or_else(|| reversed(&parts, wanted))
+        .or_else(|| joined_heading(&parts, wanted))
         .or_else(|| by_value(&parts, &slip, wanted))
         .or_else(|| by_letter(line, wanted))
         .or_else(|| by_key(&parts, wanted))
@@ -85,10 +88,11 @@ fn by_value(parts: &Parts<'_>, slip: &Slip, wanted: &Wanted<'_>) -> Option<Slip>
 /// A section begins where the line should end.
 fn joined_heading(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
     let value = parts.value?;
-    let at = value.rfind('[').filter(|_| value.ends_with(']'))?;
+    let at = value.find(" [").filter(|_| value.ends_with(']'))? + 1;
     let (before, heading) = value.split_at(at);
     let meant = parts.with(before.trim());
-    if !(wanted.takes(&meant) && is_toml(heading)) {
+    let name = heading.trim_matches(['[', ']']);
+    if is_known(name) || !(wanted.takes(&meant) && is_toml(heading)) {
         return None;
     }
     let cause = format!(
@@ -102,12 +106,48 @@ fn joined_heading(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
     })
 }
 
+/// `identity:` of a section that has such a section.
+fn subsection(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let line = parts.said.trim();
+    let name = line.strip_suffix([':', '{'])?.trim();
+    let meant = format!("[{}]", wanted.section(name)?);
+    let cause = format!("`{}` names no section", shown(line));
+    Some(Slip::new(0, cause, format!("write `{meant}`"), Some(meant)))
+}
+
+/// The value stands where the key belongs.
+fn reversed(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let key = parts.value.filter(|it| wanted.has(it))?;
+    let meant = format!("{key} = {}", parts.key);
+    if !wanted.takes(&meant) {
+        return None;
+    }
+    let cause = "the value stands before the `=`, and the key behind it".to_owned();
+    let help = format!("write `{}`", shown(&meant));
+    Some(Slip::new(
+        0,
+        cause,
+        help,
+        Some(format!("{meant} {}", parts.comment)),
+    ))
+}
+
 /// Something else than `=` parts the key and its value.
 fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
-    let line = parts.said.trim();
+    let line = parts
+        .said
+        .trim()
+        .trim_start_matches(['"', '\'', '“', '{', ' ']);
     let end = line.find(|it| !is_of_key(it))?;
     let (key, rest) = line.split_at(end);
-    let value = loosely::read(rest.trim_start_matches([':', '=', '>', ' ']), key, wanted)?;
+    let quote = rest.trim_start_matches(['"', '\'', '”', ' ']);
+    let is_between = |it: char| ":=>~;,|&* \t".contains(it);
+    let rest = if quote.starts_with(is_between) {
+        quote
+    } else {
+        rest
+    };
+    let value = loosely::read(rest.trim_start_matches(is_between), key, wanted)?;
     let cause = "a key and its value are parted by one `=`".to_owned();
     let help = format!("write `{key} = {}`", shown(&value));
     let meant = format!("{key} = {value} {}", parts.comment);
@@ -117,7 +157,12 @@ fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
 /// A value that goes on in the next line, as one line.
 pub(in crate::config) fn of_two_lines(line: &str, next: &str, wanted: &Wanted<'_>) -> Option<Slip> {
     let parts = Parts::of(line);
-    let value = parts.value?;
+    if line.starts_with('[') && !line.contains(']') {
+        return heading_of_two(line.trim(), next.trim());
+    }
+    let Some(value) = parts.value else {
+        return key_of_two(parts.said.trim(), next.trim(), wanted);
+    };
     let is_open = value.is_empty() || value.starts_with(['"', '\'']);
     let between = if value.is_empty() { " " } else { "" };
     let whole = format!("{}{between}{}", parts.said.trim_end(), next.trim_start());
@@ -131,6 +176,32 @@ pub(in crate::config) fn of_two_lines(line: &str, next: &str, wanted: &Wanted<'_
     Some(Slip::new(parts.value_at, cause, help, Some(whole)))
 }
 
+fn heading_of_two(line: &str, next: &str) -> Option<Slip> {
+    let whole = format!("{line}{next}");
+    let is_whole = next.ends_with(']') && !next.starts_with('[') && is_toml(&whole);
+    is_whole.then(|| {
+        let cause = "the line ends within the name of a section".to_owned();
+        Slip::new(
+            0,
+            cause,
+            format!("write it in one line: `{}`", shown(&whole)),
+            Some(whole),
+        )
+    })
+}
+
+fn key_of_two(word: &str, next: &str, wanted: &Wanted<'_>) -> Option<Slip> {
+    let whole = format!("{word}{next}");
+    let own = next.split('=').next().unwrap_or_default().trim();
+    let is_cut = is_key(word) && !wanted.has(own) && wanted.takes(&whole);
+    is_cut.then(|| {
+        let cause = "the line ends within a key".to_owned();
+        let said = Parts::of(&whole).said.trim().to_owned();
+        let help = format!("write it in one line: `{}`", shown(&said));
+        Slip::new(0, cause, help, Some(whole))
+    })
+}
+
 fn unreadable(raw: &str) -> String {
     format!("`{}` cannot be read as it is written here", shown(raw))
 }
@@ -138,12 +209,19 @@ fn unreadable(raw: &str) -> String {
 /// One character is too many, and only one can be that.
 fn by_letter(line: &str, wanted: &Wanted<'_>) -> Option<Slip> {
     let mut found: Option<(usize, char, String, Table)> = None;
-    // Of an identity that is one digit short nobody knows which was meant.
-    if Parts::of(line).value.is_some_and(|it| it.starts_with("0x")) {
-        return None;
-    }
+    let parts = Parts::of(line);
+    let is_number = |it: char| it.is_ascii_digit() || "+-.$#".contains(it);
+    // Of a number that is one digit short nobody knows which was meant; a point that stands there twice is one.
+    let of_number = parts
+        .value
+        .filter(|it| it.starts_with(is_number) || it.contains('/'));
+    let value_at = of_number.map_or(line.len(), |_| parts.value_at);
     for (at, it) in line.char_indices().filter(|(_, it)| !it.is_whitespace()) {
-        let rest = format!("{}{}", &line[..at], &line[at + it.len_utf8()..]);
+        let behind = &line[at + it.len_utf8()..];
+        if at >= value_at && !(it == '.' && behind.starts_with('.')) {
+            continue;
+        }
+        let rest = format!("{}{behind}", &line[..at]);
         if !wanted.takes(&rest) {
             continue;
         }
@@ -187,10 +265,13 @@ fn is_of_key(it: char) -> bool {
 
 /// A word that is no key of the section is none that wants a value; one that is cut short may be a longer one.
 fn without_invention(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip {
+    if parts.value.is_some() {
+        return without_wrong_value(slip, parts, wanted);
+    }
     let word = parts.said.trim();
     let is_alone = is_key(word);
     let word = word.split([':', ' ', '\t']).next().unwrap_or_default();
-    if wanted.keys().is_empty() || parts.value.is_some() || !is_key(word) || wanted.has(word) {
+    if wanted.keys().is_empty() || !is_key(word) || wanted.has(word) {
         return slip;
     }
     let keys = wanted.keys();
@@ -206,5 +287,38 @@ fn without_invention(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip
             ..slip
         },
         None => nothing_known(parts),
+    }
+}
+
+/// A proposal that the key cannot have is none, and neither is a key that nobody knows.
+fn without_wrong_value(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip {
+    let Some(meant) = slip.meant.as_deref() else {
+        return of_kind(slip, parts, wanted);
+    };
+    let key = meant.split('=').next().unwrap_or_default().trim();
+    let is_like = wanted.has(key) || key_meant(key, &wanted.keys()).is_some();
+    if !wanted.keys().is_empty() && !is_like && !is_key(parts.key) {
+        return nothing_known(parts);
+    }
+    match wanted.can_be(key).filter(|_| !wanted.fits_kind(meant)) {
+        Some(kind) => Slip {
+            help: format!("give {kind}"),
+            meant: None,
+            ..slip
+        },
+        None => slip,
+    }
+}
+
+/// Where nothing can be told of a value, what the key can have.
+fn of_kind(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip {
+    match wanted.can_be(parts.key).filter(|_| slip.is_unknown) {
+        Some(kind) => Slip {
+            at: parts.value_at,
+            cause: unreadable(parts.value.unwrap_or_default()),
+            help: format!("give {kind}"),
+            ..slip
+        },
+        None => slip,
     }
 }

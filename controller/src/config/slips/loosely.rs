@@ -40,18 +40,25 @@ fn is_around(it: char) -> bool {
 fn numbers(raw: &str, key: &str) -> Vec<String> {
     let core = raw.trim_matches(is_around);
     let rest = core.trim_start_matches(['-', '+', ' ']);
-    let sign = match core[..core.len() - rest.len()].contains('-') {
+    // Bookkeepers write it behind.
+    let rest = rest.strip_suffix('-').map_or(rest, str::trim_end);
+    let sign = match core.starts_with('-') || core.ends_with('-') {
         true => "-",
         false => "",
     };
     let first = rest.split([' ', '(', '\t']).next().unwrap_or_default();
-    let by_unit = split_unit(rest).and_then(|(number, unit)| converted(number, unit?, key));
+    let bare = rest.replace(['[', ']'], "");
+    let by_unit = split_unit(&bare).and_then(|(number, unit)| converted(number, unit?, key));
     // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
     let behind = rest[first.len()..].trim_start();
-    let is_remark = behind.starts_with(|it: char| it.is_alphabetic() || "(+±".contains(it));
+    let is_word = behind.chars().take(2).all(char::is_alphabetic) && behind.len() > 1;
+    let is_sum = behind.contains(['=', '^', '*']);
+    let is_remark =
+        (is_word || behind.starts_with(['(', '±', '[']) || behind.starts_with("+/-")) && !is_sum;
     let mut found = Vec::new();
     found.extend(by_unit);
-    for text in [Some(rest), Some(first).filter(|_| is_remark)] {
+    let joined = rest.replace(" e", "e").replace(" E", "e");
+    for text in [Some(joined.as_str()), Some(first).filter(|_| is_remark)] {
         let text: Option<String> = text.map(|it| it.chars().map(digit_meant).collect());
         found.extend(text.iter().flat_map(|it| plain(it)));
     }
@@ -62,7 +69,7 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
 fn digit_meant(it: char) -> char {
     match it {
         'O' | 'o' => '0',
-        'l' | 'I' | '|' => '1',
+        'l' | 'I' => '1',
         _ => it,
     }
 }
@@ -84,7 +91,10 @@ fn plain(text: &str) -> Vec<String> {
     let whole = decimal.map_or(mantissa, |at| &mantissa[..at]);
     let part = decimal.map(|at| &mantissa[at + 1..]);
     let mut found = Vec::new();
-    if let Some(part) = part.filter(|it| is_digits(it))
+    // What stands there twice parts thousands.
+    let twice = |mark: char| mantissa.matches(mark).count() > 1;
+    let is_decimal = decimal.is_some_and(|at| !mantissa[at..].starts_with(twice));
+    if let Some(part) = part.filter(|it| is_decimal && is_digits(it))
         && let Some(whole) = ungrouped(whole)
     {
         found.push(format!("{whole}.{part}{exponent}"));
@@ -115,18 +125,24 @@ fn ungrouped(text: &str) -> Option<String> {
     is_grouped.then(|| digits.to_owned())
 }
 
-/// What is quoted first, by whatever marks.
+const MARKS: [char; 16] = [
+    '"', '\'', '“', '”', '„', '«', '»', '‘', '’', '‚', '‹', '›', '´', '`', '″', '′',
+];
+
+/// What is quoted, by whatever marks; of several texts nobody knows which was meant.
 fn text(raw: &str) -> Option<String> {
-    let marks: &[char] = &[
-        '"', '\'', '“', '”', '„', '«', '»', '‘', '’', '‚', '‹', '›', '´', '`', '″', '′',
-    ];
-    let mut parts = raw.split(marks).map(str::trim);
-    let inner = match raw.contains(marks) {
-        true => parts.find(|it| !it.is_empty() && *it != "(" && *it != "[")?,
-        false => raw.trim_matches(['(', ')', '[', ']', ' ']),
+    let raw = raw.replace("&quot;", "\"");
+    let inner = match raw.matches(MARKS).count() {
+        0 => raw.trim_matches(['(', ')', '[', ']', '<', '>', ' ']),
+        1 => raw.trim_matches(|it| MARKS.contains(&it) || it == ' '),
+        2 => raw.split(MARKS).nth(1)?.trim(),
+        _ => return None,
     };
-    let is_plain = !inner.is_empty() && !inner.contains(['\\', '#', '=']);
-    is_plain.then(|| format!("\"{inner}\""))
+    let is_none = ["none", "null", "nil", "nan", "inf", "undefined"];
+    let is_plain = inner.starts_with(|it: char| it.is_alphanumeric() || "/.~_-".contains(it))
+        && !inner.contains(['\\', '#', '=', '&']);
+    let is_said = !is_none.contains(&inner.to_lowercase().as_str());
+    (is_plain && is_said).then(|| format!("\"{inner}\""))
 }
 
 fn list(raw: &str, key: &str, items: &Schema) -> Option<String> {
@@ -138,7 +154,12 @@ fn list(raw: &str, key: &str, items: &Schema) -> Option<String> {
         .flatten();
     let raw = end.map_or(raw, |end| &raw[..end]);
     let inner = raw.trim_matches(|it: char| is_bracket(it) || it.is_whitespace());
-    let by_mark: Vec<&str> = inner.split([',', ';', '/']).collect();
+    // Where semicolons part them commas are decimal ones.
+    let marks: &[char] = match inner.contains(';') {
+        true => &[';'],
+        false => &[',', '/', '|'],
+    };
+    let by_mark: Vec<&str> = inner.split(marks).collect();
     let by_space: Vec<&str> = inner.split_whitespace().collect();
     let entries = match by_mark.len() {
         1 => by_space,

@@ -144,12 +144,12 @@ fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     // `10h` are hours and `20c` degrees.
     let is_number =
         marked.is_some() || digits.starts_with('0') || letters > 1 || digits.len() < value.len();
-    let is_unit = marked.is_none() && letters == 0 && !digits.starts_with('0');
+    let is_identity = HEXADECIMAL.contains(&parts.key);
+    let is_unit = marked.is_none() && letters == 0 && !digits.starts_with('0') && !is_identity;
     let is_digits = digits.starts_with(|it: char| marked.is_some() || it.is_ascii_digit())
         && digits.chars().all(|it| it.is_ascii_hexdigit());
     // `010` is ten with a zero before it, but in an identity.
-    let is_decimal =
-        digits.len() == value.len() && letters == 0 && !HEXADECIMAL.contains(&parts.key);
+    let is_decimal = digits.len() == value.len() && letters == 0 && !is_identity;
     if !is_digits || !is_number || is_unit || is_decimal {
         return None;
     }
@@ -174,8 +174,14 @@ fn list(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     if let Some(slip) = parts.value_meant(&meant, cause, help) {
         return Some(slip);
     }
-    let entries = inner.split([',', ';', ' ']).filter(|it| !it.is_empty());
-    let meant = format!("[{}]", entries.collect::<Vec<_>>().join(", "));
+    let meant = match inner.contains(';') && inner.contains(',') {
+        // Where semicolons part them commas are decimal ones.
+        true => format!("[{}]", inner.replace(',', ".").replace(';', ",")),
+        false => {
+            let entries = inner.split([',', ';', ' ']).filter(|it| !it.is_empty());
+            format!("[{}]", entries.collect::<Vec<_>>().join(", "))
+        }
+    };
     let help = format!("write {}", shown(&meant));
     let cause = format!(
         "`{}`: the entries of a list are parted by one comma",
@@ -209,6 +215,13 @@ fn quotes(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     if inner == value && !inner.contains(['"', '\'']) {
         return None;
     }
+    // Of several texts, or of one with something before it, nobody knows which was meant.
+    let count = value.matches('"').count().max(value.matches('\'').count());
+    let is_one = value.starts_with(['"', '\'']) || !value.ends_with(['"', '\'']) || count < 2;
+    let is_several = count > 2 && !(value.starts_with("\"\"") || value.starts_with("''"));
+    if value.contains(['+', '&', '<']) || !is_one || is_several {
+        return None;
+    }
     if let Some(slip) = behind_a_text(parts, value) {
         return Some(slip);
     }
@@ -224,7 +237,12 @@ fn behind_a_text(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let quote = value.chars().next().filter(|it| "\"'".contains(*it))?;
     let end = value[1..].find(quote)? + 2;
     let (text, rest) = value.split_at(end);
-    if rest.is_empty() || rest.contains(quote) || text.len() == 2 {
+    // A section that begins there is another slip.
+    if rest.trim_start().starts_with('[')
+        || rest.is_empty()
+        || rest.contains(quote)
+        || text.len() == 2
+    {
         return None;
     }
     let cause = format!("`{}` stands behind the text's end", shown(rest.trim()));
@@ -239,7 +257,8 @@ fn word(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let (meant, is_text) = match value.to_lowercase().as_str() {
         "true" | "yes" | "on" => ("true".to_owned(), false),
         "false" | "no" | "off" => ("false".to_owned(), false),
-        "null" | "nil" | "none" | "nan" | "inf" | "infinity" | "?" | "todo" | "tbd" => {
+        "null" | "nil" | "none" | "undefined" | "n/a" | "nan" | "inf" | "infinity" | "?"
+        | "todo" | "tbd" => {
             let cause = format!("`{value}` is no value here");
             let help = "give a value; a key that may be left out is left out with its name";
             return Some(Slip::new(parts.value_at, cause, help.into(), None));

@@ -76,10 +76,21 @@ fn is_part_of_one(name: &str, inner: &Table, own: &Schema) -> bool {
 
 fn without_name(path: &str, part: &str, seen: &Table, found: &mut Found<'_>) {
     let key = below(path, part);
-    let names: Vec<_> = seen.keys().filter(|it| *it != part).collect();
-    let name = names.first().map_or("NAME", |it| it.as_str());
+    let others = seen.iter().filter(|(name, _)| *name != part);
+    let lacks = |it: &Value| it.as_table().is_some_and(|it| !it.contains_key(part));
+    let lacking: Vec<_> = others
+        .filter(|(_, it)| lacks(it))
+        .map(|it| it.0.as_str())
+        .collect();
+    let name = match lacking[..] {
+        [one] => one,
+        _ => "NAME",
+    };
     let cause = format!("`{part}` is a section of one of [{path}.NAME], and says not of which");
-    let help = format!("write [{path}.{name}.{part}]");
+    let help = match name {
+        "NAME" => format!("write [{path}.NAME.{part}], with the name of one of them"),
+        name => format!("write [{path}.{name}.{part}]"),
+    };
     found.repairs.push(Repair::Remove { key: key.clone() });
     tell(found, key, cause, help);
 }

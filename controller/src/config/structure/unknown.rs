@@ -59,7 +59,7 @@ pub(super) fn unknown<'a>(
     };
     let remove = || Repair::Remove { key: key.clone() };
     if let Some(joined) = joined(name, value, section) {
-        let help = format!("write `{joined}`: the words of a key are joined by _");
+        let help = format!("write `{joined}`");
         tell("there is no such key here".to_owned(), help, remove());
         return Some(joined);
     }
@@ -92,9 +92,12 @@ pub(super) fn unknown<'a>(
 /// `stage.serial` is a section with a key, and was meant to be a key.
 fn joined<'a>(name: &str, value: &Value, section: &Section<'a>) -> Option<&'a str> {
     let mut keys = value.as_table()?.keys();
-    let joined = format!("{name}_{}", keys.next()?);
-    let known = section.keys.get_key_value(joined.as_str());
-    known.filter(|_| keys.next().is_none()).map(|it| *it.0)
+    let (only, rest) = (keys.next()?, keys.next());
+    let joined = format!("{name}_{only}");
+    // `self.speed`, as in a program.
+    let known = [joined.as_str(), only].into_iter();
+    let mut known = known.filter_map(|it| section.keys.get_key_value(it));
+    known.next().filter(|_| rest.is_none()).map(|it| *it.0)
 }
 
 /// Keys of another section, of which the heading above them is missing: at least two, all of one.
@@ -130,7 +133,11 @@ pub(super) fn tell_orphans(path: &str, orphans: &[&str], home: &str, found: &mut
     keys.sort_by_key(|it| found.written(it, Part::Name).map(|it| it.start));
     let names: Vec<_> = orphans.iter().map(|it| format!("`{it}`")).collect();
     let cause = format!("{} are keys of [{home}]", names.join(", "));
-    let help = format!("write the line [{home}] above them, or remove them");
+    // Of a section of this one the name is known.
+    let help = match !path.is_empty() && home.starts_with(&format!("{path}.")) {
+        true => format!("write the line [{home}] above them, or remove them"),
+        false => "write the line with the name of their section above them, or remove them".into(),
+    };
     let key = keys.into_iter().next().unwrap_or_default();
     found
         .findings

@@ -37,7 +37,7 @@ fn truth(word: &str) -> Option<bool> {
     }
 }
 
-pub(super) fn in_words(expected: &str) -> &'static str {
+pub(in crate::config) fn in_words(expected: &str) -> &'static str {
     match expected {
         "object" => "a section",
         "array" => "a list",

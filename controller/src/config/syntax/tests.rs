@@ -80,7 +80,12 @@ fn a_number_or_a_word_that_is_nearly_right_is_told_as_what_it_is() {
     check(from, "correct_air = off", key, ["`off`", "write false"]);
     let from = "device_type = 0x00020192";
     let key = "axis.x.identity.device_type";
-    check(from, "device_type = 0x0002019G", key, ["", "`key = value`"]);
+    check(
+        from,
+        "device_type = 0x0002019G",
+        key,
+        ["cannot be read", "give a whole number"],
+    );
 }
 
 #[test]
@@ -235,7 +240,6 @@ fn what_is_proposed_is_a_line_that_the_section_takes() {
         "0.2 0.2",
         "0..2",
         "0.2^M",
-        "0.2x7",
         "0.0002 mm",
         "″0.2″",
     ] {
@@ -290,6 +294,12 @@ fn a_heading_is_proposed_that_is_there() {
         ("[axis.x.identity]", "[axis..x.identity]"),
         ("[axis.x.identity]", "[axis.x.identity] ="),
         ("[axis.x.identity]", "axis.x.identity:"),
+        ("[axis.x.identity]", "- [axis.x.identity]"),
+        ("[axis.x.identity]", "axis.x.identity = {"),
+        ("[axis.x.identity]", "identity:"),
+        ("[axis.x.identity]", "[axis.x.\nidentity]"),
+        ("[axis.x.identity]", "\"[axis.x.identity]\""),
+        ("[axis.x.identity]", "［axis.x.identity］"),
         ("[axis.x.identity]", "[axis.x.ident"),
         ("[axis.x.identity]", "[[axis.x.identity]]"),
         ("[machine]", "machine:"),
@@ -321,5 +331,55 @@ fn a_section_within_a_line_is_proposed_as_a_whole() {
             panic!("{value}: {found:#?}")
         };
         assert!(one.help.contains(wanted), "{value}: {one}");
+    }
+}
+
+#[test]
+fn no_value_is_proposed_that_was_not_meant() {
+    let key = "standard_uncertainty_limit_um = ";
+    for value in [
+        "0.4/2",
+        "0.2 0.3",
+        "2 x 10^-1",
+        "0.S2",
+        "0.1+0.1",
+        "0.2 and more = 3",
+    ] {
+        let to = format!("{key}{value}");
+        let found = match parse(
+            &LINEAR.edit_first("standard_uncertainty_limit_um = 0.2", &to),
+            "m.toml",
+        ) {
+            Err(ConfigError::Invalid { findings }) => findings,
+            other => panic!("{to}: {other:?}"),
+        };
+        for it in &found {
+            let proposed = it.help.split("write ").nth(1).unwrap_or_default();
+            assert!(
+                !proposed.starts_with(|it: char| it.is_ascii_digit()),
+                "{to}: {it}"
+            );
+        }
+    }
+    // In any alphabet, and of whatever length.
+    for line in [
+        "• device = 1",
+        "“device” = 1",
+        "［axis］",
+        "é",
+        "′",
+        "-",
+        "[",
+        "]",
+        "=",
+        "\"",
+        "ß = ß",
+        "…: 5",
+    ] {
+        let text = LINEAR.edit_first("device = \"cia402\"", line);
+        assert!(
+            matches!(parse(&text, "m.toml"), Err(ConfigError::Invalid { .. })),
+            "{line}"
+        );
     }
 }

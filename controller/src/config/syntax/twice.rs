@@ -25,7 +25,11 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
             .count()
             + 1;
         let place = Place::at(lines, number);
-        let (cause, help) = place.told();
+        let (cause, help) = match has_begun_again(lines, number, &place) {
+            true => again(&place),
+            false => place.told(),
+        };
+        let is_again = has_begun_again(lines, number, &place);
         found.contested.push(place.key());
         found.findings.push(Diagnostic {
             file: file.to_owned(),
@@ -36,8 +40,32 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
             help,
         });
         let is_section = place.is_section();
-        leave_out(lines, number, is_section);
+        leave_out(lines, number, is_section || is_again);
     }
+}
+
+/// Whether the next key of the section, too, stands there a second time: it is another section's that lacks its name.
+fn has_begun_again(lines: &[String], number: usize, place: &Place<'_>) -> bool {
+    if place.is_section() || place.twice().is_none() {
+        return false;
+    }
+    let rest = lines.iter().enumerate().skip(number + 1);
+    let mut next = rest.filter(|(_, it)| !it.trim().is_empty() && !it.trim().starts_with('#'));
+    next.next().is_some_and(|(at, line)| {
+        let next = Place::at(lines, at);
+        !is_header(line) && next.twice().is_some()
+    })
+}
+
+fn again(place: &Place<'_>) -> (String, String) {
+    let section = match name_of(place.section) {
+        "" => "the top of the file".to_owned(),
+        name => format!("[{name}]"),
+    };
+    let cause = format!("from here on keys stand that {section} has already");
+    let help =
+        "a line with the name of another section is missing above them: write it, or remove them";
+    (cause, help.into())
 }
 
 /// The line, and all of the section that it begins.
@@ -139,7 +167,13 @@ impl<'a> Place<'a> {
         }
         let what = if is_section { "the section" } else { "the key" };
         let cause = format!("{what} stands here a second time; line {number} has it first");
-        Some((cause, "leave one of them out".into()))
+        let help = match is_section {
+            true => "leave one of them out",
+            false => {
+                "leave one of them out, or write the section's name that is missing between them"
+            }
+        };
+        Some((cause, help.into()))
     }
 
     /// Where a key has the name that a section has here, or the other way round.
