@@ -38,11 +38,18 @@ fn is_around(it: char) -> bool {
 }
 
 fn numbers(raw: &str, key: &str) -> Vec<String> {
+    if raw.starts_with('±') || raw.starts_with("+/-") {
+        // Which of the two nobody knows.
+        return Vec::new();
+    }
+    // A dash is a minus: without it the number would go the other way.
+    let raw = raw.replace(['−', '–', '—', '‐', '‑', '－'], "-");
     let core = raw.trim_matches(is_around);
     let rest = core.trim_start_matches(['-', '+', ' ']);
+    let before = &core[..core.len() - rest.len()];
     // Bookkeepers write it behind.
     let rest = rest.strip_suffix('-').map_or(rest, str::trim_end);
-    let sign = match core.starts_with('-') || core.ends_with('-') {
+    let sign = match before.contains('-') || core.ends_with('-') {
         true => "-",
         false => "",
     };

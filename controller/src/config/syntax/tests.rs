@@ -254,6 +254,10 @@ fn what_is_proposed_is_a_line_that_the_section_takes() {
     for value in ["115,200", "115.200,0", "115 200", "1l5200", "0115200"] {
         check_meant(LINEAR, from, &format!("{rate}{value}"), "115200");
     }
+    for value in ["3.0-", "- 3.0", "--3.0", "+-3.0", "−3,0", "-3.0 (below)"] {
+        let to = format!("soft_min_mm = {value}");
+        check_meant(LINEAR, "soft_min_mm = -3.0", &to, "-3.0");
+    }
     let text = "device = \"cia402\"";
     for line in [
         "set device = \"cia402\"",
@@ -344,6 +348,7 @@ fn no_value_is_proposed_that_was_not_meant() {
         "0.S2",
         "0.1+0.1",
         "0.2 and more = 3",
+        "±0.2",
     ] {
         let to = format!("{key}{value}");
         let found = match parse(
