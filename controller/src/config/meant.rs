@@ -18,7 +18,14 @@ pub(super) fn key_meant<'a>(seen: &str, free: &[&'a str]) -> Option<&'a str> {
 
 /// The word of `known` that is most like `seen`, if one is.
 pub(super) fn word_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
-    most_alike(known, |word| likeness(word, seen))
+    let best = most_alike(known, |word| likeness(word, seen))?;
+    // Of several that are equally near nobody knows which was meant.
+    let likeness_of_best = likeness(best, seen);
+    let others = known.iter().filter(|it| **it != best);
+    let is_only = others
+        .map(|it| likeness(it, seen))
+        .all(|it| it < likeness_of_best);
+    is_only.then_some(best)
 }
 
 fn most_alike<'a>(known: &[&'a str], alike: impl Fn(&str) -> f64) -> Option<&'a str> {

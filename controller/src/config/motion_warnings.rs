@@ -4,32 +4,23 @@ use units::Short;
 
 use super::AxisConfig;
 use super::judge::{Finding, Judge};
-use super::least_time::{least_time, span};
+use super::least_time::span;
 use super::model::MachineConfig;
 use crate::rotary::RotaryConfig;
 
-/// A slow speed beside a usual acceleration is reached in some tenths of a millisecond; no stage reaches its own sooner, and
-/// nobody lets one take longer.
-const RAMP_S: (f64, f64) = (2e-4, 10.0);
-/// Nobody waits longer for one move.
-const WAY_MAX_S: f64 = 3600.0;
-/// The fastest possible is some times the usual speed.
-const SPEEDS: f64 = 1000.0;
-/// A quick stop is some times as hard as the end of a move.
-const QUICK_STOPS: f64 = 500.0;
+/// A piezo at a slow speed reaches it in a hundredth of a millisecond, a heavy table in half a minute.
+const RAMP_S: (f64, f64) = (1e-5, 60.0);
 /// A lag of more than this share of the travel is no error any more: the axis stands.
 const LAG_SHARE: f64 = 0.1;
 /// An axis that may stand this far off has no place.
 const WINDOW_SHARE: f64 = 0.01;
-const TRAVEL_MM: (f64, f64) = (0.1, 10_000.0);
+const TRAVEL_MM: (f64, f64) = (0.005, 10_000.0);
 const TURN_DEG: f64 = 360.0;
 
 /// Keys and units of linear axes or of tables.
 struct Words {
     speed: (&'static str, &'static str),
-    speed_max: &'static str,
     acceleration: (&'static str, &'static str),
-    quick_stop: &'static str,
     lag: &'static str,
     /// The unit of lag and window, and how many are one of the way.
     fine: (&'static str, f64),
@@ -38,9 +29,7 @@ struct Words {
 
 const LINEAR: Words = Words {
     speed: ("speed_mm_per_s", "mm/s"),
-    speed_max: "speed_max_mm_per_s",
     acceleration: ("acceleration_mm_per_s2", "mm/s²"),
-    quick_stop: "quick_stop_deceleration_mm_per_s2",
     lag: "following_error_limit_um",
     fine: ("µm", 1e3),
     way: "mm",
@@ -48,9 +37,7 @@ const LINEAR: Words = Words {
 
 const ROTARY: Words = Words {
     speed: ("speed_deg_per_s", "°/s"),
-    speed_max: "speed_max_deg_per_s",
     acceleration: ("acceleration_deg_per_s2", "°/s²"),
-    quick_stop: "quick_stop_deceleration_deg_per_s2",
     lag: "following_error_limit_arcsec",
     fine: ("″", 3600.0),
     way: "°",
@@ -61,9 +48,7 @@ struct Motion {
     words: &'static Words,
     way: f64,
     speed: f64,
-    speed_max: f64,
     acceleration: f64,
-    quick_stop: f64,
     lag: f64,
     window: f64,
 }
@@ -75,9 +60,7 @@ impl Motion {
             words: &LINEAR,
             way: motion.soft_max_mm - motion.soft_min_mm,
             speed: motion.speed_mm_per_s,
-            speed_max: motion.speed_max_mm_per_s,
             acceleration: motion.acceleration_mm_per_s2,
-            quick_stop: motion.quick_stop_deceleration_mm_per_s2,
             lag: motion.following_error_limit_um,
             window: motion.position_window_um,
         }
@@ -88,9 +71,7 @@ impl Motion {
             words: &ROTARY,
             way: TURN_DEG,
             speed: table.speed_deg_per_s,
-            speed_max: table.speed_max_deg_per_s,
             acceleration: table.acceleration_deg_per_s2,
-            quick_stop: table.quick_stop_deceleration_deg_per_s2,
             lag: table.following_error_limit_arcsec,
             window: table.position_window_arcsec,
         }
@@ -98,9 +79,6 @@ impl Motion {
 
     fn judge(&self, judge: &mut Judge<'_>) {
         self.ramp(judge);
-        self.slow(judge);
-        self.fastest(judge);
-        self.hard_stop(judge);
         self.lag(judge);
     }
 
@@ -119,61 +97,7 @@ impl Motion {
         judge.say(
             key,
             cause,
-            format!(
-                "check it and {}: a ramp takes 0.01 to 1 s",
-                self.words.speed.0
-            ),
-        );
-    }
-
-    fn slow(&self, judge: &mut Judge<'_>) {
-        let least_s = least_time(self.way, self.speed, self.acceleration);
-        if least_s <= WAY_MAX_S {
-            return;
-        }
-        let (key, unit) = self.words.speed;
-        let cause = format!(
-            "the way of {} {} takes {} at {} {unit}",
-            Short(self.way),
-            self.words.way,
-            span(least_s),
-            Short(self.speed)
-        );
-        judge.say(key, cause, format!("check it: it is in {unit}"));
-    }
-
-    fn fastest(&self, judge: &mut Judge<'_>) {
-        if self.speed_max <= SPEEDS * self.speed {
-            return;
-        }
-        let (other, unit) = self.words.speed;
-        let cause = format!(
-            "{} {unit} are {:.0} times {other}, {} {unit}: what cannot be is hardly noticed",
-            Short(self.speed_max),
-            self.speed_max / self.speed,
-            Short(self.speed)
-        );
-        judge.say(
-            self.words.speed_max,
-            cause,
-            format!("check both: they are in {unit}"),
-        );
-    }
-
-    fn hard_stop(&self, judge: &mut Judge<'_>) {
-        if self.quick_stop < QUICK_STOPS * self.acceleration {
-            return;
-        }
-        let (_, unit) = self.words.acceleration;
-        let cause = format!(
-            "a quick stop slows down by {} {unit}, {:.0} times as hard as an ordinary move",
-            Short(self.quick_stop),
-            self.quick_stop / self.acceleration
-        );
-        judge.say(
-            self.words.quick_stop,
-            cause,
-            format!("check it: it is in {unit}; 2 to 20 times the acceleration is usual"),
+            format!("check it and {}, and their units", self.words.speed.0),
         );
     }
 
@@ -249,70 +173,14 @@ mod tests {
     #[test]
     fn a_ramp_that_no_drive_has_is_told() {
         let edits = [
-            ("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 1.0"),
-            (
-                "acceleration_mm_per_s2 = 5000.0",
-                "acceleration_mm_per_s2 = 10000.0",
-            ),
-            ("move_timeout_s = 10.0", "move_timeout_s = 100.0"),
-        ];
-        let says = "1 mm/s and 10000 mm/s²: a ramp of 100µs";
-        check(LINEAR, &edits, &["axis.x.acceleration_mm_per_s2"], says);
-        let edits = [
             (
                 "acceleration_deg_per_s2 = 180.0",
-                "acceleration_deg_per_s2 = 2.0",
+                "acceleration_deg_per_s2 = 0.4",
             ),
-            ("move_timeout_s = 60.0", "move_timeout_s = 90.0"),
+            ("move_timeout_s = 60.0", "move_timeout_s = 900.0"),
         ];
-        let says = "30 °/s and 2 °/s²: a ramp of 15s";
+        let says = "30 °/s and 0.4 °/s²: a ramp of 75s";
         check(ROTARY, &edits, &["rotary.c.acceleration_deg_per_s2"], says);
-    }
-
-    #[test]
-    fn a_speed_that_is_no_speed_of_this_axis_is_told() {
-        let edits = [
-            ("\nspeed_mm_per_s = 200.0", "\nspeed_mm_per_s = 0.2"),
-            (
-                "acceleration_mm_per_s2 = 5000.0",
-                "acceleration_mm_per_s2 = 50.0",
-            ),
-            ("move_timeout_s = 10.0", "move_timeout_s = 400.0"),
-            (
-                "quick_stop_deceleration_mm_per_s2 = 20000.0",
-                "quick_stop_deceleration_mm_per_s2 = 1000.0",
-            ),
-        ];
-        let says = "1000 mm/s are 5000 times speed_mm_per_s, 0.2 mm/s";
-        check(LINEAR, &edits, &["axis.x.speed_max_mm_per_s"], says);
-        let edits = [
-            ("\nspeed_deg_per_s = 30.0", "\nspeed_deg_per_s = 0.09"),
-            ("speed_max_deg_per_s = 180.0", "speed_max_deg_per_s = 60.0"),
-            (
-                "acceleration_deg_per_s2 = 180.0",
-                "acceleration_deg_per_s2 = 20.0",
-            ),
-            (
-                "quick_stop_deceleration_deg_per_s2 = 720.0",
-                "quick_stop_deceleration_deg_per_s2 = 72.0",
-            ),
-            ("move_timeout_s = 60.0", "move_timeout_s = 5000.0"),
-        ];
-        let says = "the way of 360 ° takes 4000s at 0.09 °/s";
-        check(ROTARY, &edits, &["rotary.c.speed_deg_per_s"], says);
-    }
-
-    #[test]
-    fn a_quick_stop_that_nothing_bears_is_told() {
-        let edit = (
-            "quick_stop_deceleration_mm_per_s2 = 500.0",
-            "quick_stop_deceleration_mm_per_s2 = 50000.0",
-        );
-        let key = "axis.u.quick_stop_deceleration_mm_per_s2";
-        let says = "by 50000 mm/s², 1000 times as hard";
-        // Counts of 10 nm: beyond the drive's 32 bits it is refused.
-        let edits = [("resolution_nm = 10.0", "resolution_nm = 50.0"), edit];
-        check(UVW, &edits, &[key], says);
     }
 
     #[test]

@@ -224,7 +224,9 @@ fn comment(parts: &Parts<'_>) -> Option<Slip> {
         let (before, after) = value.split_once(sign)?;
         let is_end = after.trim().is_empty();
         let meant = parts.with(before.trim());
-        let is_said = !is_end && !before.trim().is_empty();
+        // `5;0` is a number that was mistyped.
+        let is_apart = before.ends_with(' ') || after.starts_with(' ');
+        let is_said = is_apart && !is_end && !before.trim().is_empty();
         (is_said && is_toml(&meant)).then_some((sign, before.len(), meant))
     });
     let (sign, at, meant) = found?;

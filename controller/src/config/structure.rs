@@ -156,13 +156,14 @@ fn any(path: &str, value: &Value, schema: &Schema, found: &mut Found<'_>) {
         ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
         (expected, _) => {
             let cause = format!("expected {} here, this is {seen}", in_words(expected));
-            found.replace(path, converted(expected, value));
+            let key = path.rsplit('.').next().unwrap_or_default();
+            found.replace(path, converted(expected, value, key));
             let written = found.as_written(path).unwrap_or_default();
             let help = match (expected, value) {
                 ("object", Value::Array(items)) if items.iter().all(Value::is_table) => {
                     format!("write `[{path}]`, once")
                 }
-                _ => correction(expected, value, written),
+                _ => correction(expected, value, (key, written)),
             };
             say(found, path, cause, help);
         }
@@ -301,7 +302,7 @@ fn takes_text(value: &str, schema: &Schema) -> bool {
 
 /// Whether it may be `[0,5, 1,5]` for `[0.5, 1.5]`.
 fn has_commas(items: &[Value], wanted: Option<u64>) -> bool {
-    let is_whole = |it: &Value| it.is_integer() || it.is_float();
+    let is_whole = |it: &Value| it.as_integer().is_some();
     let is_twice = wanted.is_some_and(|it| it > 0 && items.len() as u64 == 2 * it);
     is_twice && items.iter().all(is_whole)
 }

@@ -67,7 +67,7 @@ impl Recovered {
         self.findings.push(Diagnostic {
             file: file.to_owned(),
             line: number,
-            column: line[..slip.at.min(line.len())].chars().count() + 1,
+            column: line.get(..slip.at).unwrap_or(line).chars().count() + 1,
             key,
             cause: slip.cause.clone(),
             help: slip.help.clone(),

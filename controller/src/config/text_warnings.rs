@@ -75,9 +75,14 @@ fn check_serial(judge: &mut Judge<'_>, serial: &str) {
     check_letters(judge, "stage_serial", serial);
 }
 
+/// Greek and Cyrillic: most capitals of theirs look like Latin ones.
+fn is_look_alike(it: char) -> bool {
+    ('\u{370}'..='\u{52f}').contains(&it)
+}
+
 /// Letters that look like others, marks within marks, blanks at an end.
 fn check_letters(judge: &mut Judge<'_>, key: &str, text: &str) {
-    if let Some(it) = text.chars().find(|it| !it.is_ascii()) {
+    if let Some(it) = text.chars().find(|it| is_look_alike(*it)) {
         let cause = format!(
             "\"{text}\" has a `{it}` that is none of the keyboard's (U+{:04X})",
             u32::from(it)
@@ -88,7 +93,8 @@ fn check_letters(judge: &mut Judge<'_>, key: &str, text: &str) {
             "type it anew, if it was meant to be the letter that it looks like",
         );
     }
-    if text.contains(['"', '\'']) {
+    let is_quoted = |mark| text.len() > 1 && text.starts_with(mark) && text.ends_with(mark);
+    if is_quoted('"') || is_quoted('\'') {
         let cause = format!("the quotation marks in {text} are part of it");
         judge.say(key, cause, "remove those within it");
     }

@@ -38,7 +38,8 @@ impl<'a> Heading<'a> {
         // Words behind it, or in round brackets, are a remark.
         let behind = bare.rsplit(CLOSED).next().unwrap_or_default().trim();
         let is_remark = bare.starts_with('(') && (inner.contains(' ') || !behind.is_empty());
-        if inner.contains(OPEN) || is_remark {
+        let is_list = inner.starts_with(|it: char| it.is_ascii_digit() || "-+".contains(it));
+        if inner.contains(OPEN) || is_remark || is_list {
             return None;
         }
         let name = inner.split(CLOSED).next().unwrap_or_default();
@@ -83,12 +84,20 @@ fn bare<'a>(parts: &Parts<'a>) -> &'a str {
     // A word, or a list's mark, before the bracket.
     match line.find('[') {
         Some(at)
-            if line.ends_with(']') && !line[..at].contains(['=', '.', ':', '"', '\'', '＝']) =>
+            if is_name_at(&line[at..])
+                && line.ends_with(']')
+                && !line[..at].contains(['=', '.', ':', '"', '\'', '＝']) =>
         {
             &line[at..]
         }
         _ => line,
     }
+}
+
+/// Whether a name stands in the brackets, and no list.
+fn is_name_at(text: &str) -> bool {
+    let inner = text.trim_start_matches('[');
+    inner.starts_with(char::is_alphabetic)
 }
 
 /// A name of several parts without any brackets, of which the first is known.
@@ -144,6 +153,7 @@ pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> 
 
 /// A key on the line of the heading.
 fn with_a_key(line: &str) -> Option<Slip> {
+    let indent = line.len() - line.trim_start().len();
     let line = line.trim();
     let end = line.find(']')? + 1;
     let end = end + line[end..].len() - line[end..].trim_start_matches(']').len();
@@ -159,6 +169,6 @@ fn with_a_key(line: &str) -> Option<Slip> {
     let help = format!("begin a new line before `{}`", shown(key));
     Some(Slip {
         key: Some(key.to_owned()),
-        ..Slip::new(end, cause, help, Some(heading.to_owned()))
+        ..Slip::new(indent + end, cause, help, Some(heading.to_owned()))
     })
 }

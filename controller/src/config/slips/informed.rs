@@ -147,7 +147,12 @@ fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
     } else {
         rest
     };
-    let value = loosely::read(rest.trim_start_matches(is_between), key, wanted)?;
+    let rest = rest.trim_start_matches(is_between);
+    // A dash may part them, or be the sign.
+    if rest.starts_with("- ") {
+        return None;
+    }
+    let value = loosely::read(rest, key, wanted)?;
     let cause = "a key and its value are parted by one `=`".to_owned();
     let help = format!("write `{key} = {}`", shown(&value));
     let meant = format!("{key} = {value} {}", parts.comment);
@@ -206,8 +211,14 @@ fn unreadable(raw: &str) -> String {
     format!("`{}` cannot be read as it is written here", shown(raw))
 }
 
+const TRIED_MAX: usize = 200;
+
 /// One character is too many, and only one can be that.
 fn by_letter(line: &str, wanted: &Wanted<'_>) -> Option<Slip> {
+    // Each character is tried: of a long list that would take minutes.
+    if line.len() > TRIED_MAX {
+        return None;
+    }
     let mut found: Option<(usize, char, String, Table)> = None;
     let parts = Parts::of(line);
     let is_number = |it: char| it.is_ascii_digit() || "+-.$#".contains(it);

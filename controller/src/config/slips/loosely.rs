@@ -4,7 +4,7 @@
 use serde_json::Value as Schema;
 
 use crate::config::schema::type_of;
-use crate::config::unit::{converted, split_unit};
+use crate::config::unit::{converted, is_known, split_unit};
 use crate::config::wanted::Wanted;
 
 /// What `raw` was meant to be, as a value of `key`; `None` where that cannot be told.
@@ -38,28 +38,38 @@ fn is_around(it: char) -> bool {
 }
 
 fn numbers(raw: &str, key: &str) -> Vec<String> {
-    if raw.starts_with('±') || raw.starts_with("+/-") {
-        // Which of the two nobody knows.
+    // Which of two signs was meant nobody knows, nor whether one behind the number, or brackets, are one.
+    let is_unsure = raw.starts_with(['±', '(']) || raw.starts_with("+/-") || raw.ends_with('-');
+    if is_unsure {
         return Vec::new();
     }
     // A dash is a minus: without it the number would go the other way.
-    let raw = raw.replace(['−', '–', '—', '‐', '‑', '－'], "-");
+    let raw = raw.replace(['−', '–', '—', '‐', '‑', '‒', '⁻', '﹣', '﹘', '－'], "-");
     let core = raw.trim_matches(is_around);
     let rest = core.trim_start_matches(['-', '+', ' ']);
     let before = &core[..core.len() - rest.len()];
-    // Bookkeepers write it behind.
-    let rest = rest.strip_suffix('-').map_or(rest, str::trim_end);
-    let sign = match before.contains('-') || core.ends_with('-') {
+    // A sentence's end.
+    let rest = rest
+        .strip_suffix('.')
+        .filter(|it| it.contains('.'))
+        .unwrap_or(rest);
+    let sign = match before.contains('-') {
         true => "-",
         false => "",
     };
     let first = rest.split([' ', '(', '\t']).next().unwrap_or_default();
-    let bare = rest.replace(['[', ']'], "");
+    let bare = rest.replace(['[', ']', '(', ')'], "").replace(',', ".");
     let by_unit = split_unit(&bare).and_then(|(number, unit)| converted(number, unit?, key));
     // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
     let behind = rest[first.len()..].trim_start();
     let is_word = behind.chars().take(2).all(char::is_alphabetic) && behind.len() > 1;
     let is_sum = behind.contains(['=', '^', '*']);
+    // A unit is no remark: what it is converted to is told, or nothing.
+    let word = behind.split(' ').next().unwrap_or_default();
+    let is_known_unit = is_known(word.trim_matches(['(', ')', '[', ']']));
+    if is_known_unit && by_unit.is_none() {
+        return Vec::new();
+    }
     let is_remark =
         (is_word || behind.starts_with(['(', '±', '[']) || behind.starts_with("+/-")) && !is_sum;
     let mut found = Vec::new();
@@ -144,6 +154,11 @@ fn text(raw: &str) -> Option<String> {
         1 => raw.trim_matches(|it| MARKS.contains(&it) || it == ' '),
         2 => raw.split(MARKS).nth(1)?.trim(),
         _ => return None,
+    };
+    // `[can.can0]` is how the section is called.
+    let inner = match raw.starts_with('[') {
+        true => inner.rsplit('.').next().unwrap_or(inner),
+        false => inner,
     };
     let is_none = ["none", "null", "nil", "nan", "inf", "undefined"];
     let is_plain = inner.starts_with(|it: char| it.is_alphanumeric() || "/.~_-".contains(it))

@@ -29,7 +29,7 @@ pub(in crate::config) fn regrouped(document: Table, schema: &Schema) -> (Table, 
             join(&mut whole, nested);
         }
         let cause = "no section has this name".to_owned();
-        let help = format!("write `[{heading}]`");
+        let help = format!("write `{heading}`");
         let finding = Finding {
             key: name,
             cause,
@@ -89,8 +89,12 @@ fn heading_of(value: &Value) -> String {
                 parts.push(name.as_str());
                 at = only;
             }
+            (Some((name, Value::Array(_))), None) => {
+                parts.push(name.as_str());
+                return format!("[[{}]]", parts.join("."));
+            }
             _ => break,
         }
     }
-    parts.join(".")
+    format!("[{}]", parts.join("."))
 }

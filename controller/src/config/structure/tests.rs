@@ -59,7 +59,10 @@ fn a_value_of_another_type_says_how_it_is_written() {
     let says = ["expected a list here", "[...]"];
     let (from, key) = ("channels = [0, 1]", "analog.hall.channels");
     check(LINEAR, from, "channels = 0", key, says);
-    let says = ["expected a whole number here, this is a number", "write 2"];
+    let says = [
+        "expected a whole number here, this is a number",
+        "give a whole number",
+    ];
     check(
         LINEAR,
         "node_id = 1\n",

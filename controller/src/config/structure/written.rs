@@ -2,11 +2,14 @@
 
 use toml::Value;
 
-use crate::config::unit::{is_unit, split_unit};
+use crate::config::unit::{self, is_unit, split_unit};
 
 /// A value of another type as it was meant.
-pub(super) fn converted(expected: &str, value: &Value) -> Option<Value> {
+pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Value> {
     match (expected, value) {
+        ("number", Value::String(text)) if in_other_unit(text, key).is_some() => {
+            in_other_unit(text, key)?.parse().ok().map(Value::Float)
+        }
         ("number", Value::String(text)) => {
             let number = number_in(text)?.trim();
             number.parse().ok().map(Value::Float)
@@ -60,10 +63,14 @@ pub(super) const fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// What to write instead of a value that stands in the file as `written`.
-pub(super) fn correction(expected: &str, value: &Value, written: &str) -> String {
+/// What to write instead of a value of `key` that stands in the file as `written`.
+pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &str)) -> String {
     match (expected, value) {
         ("number" | "integer", Value::String(text)) => match number_in(text) {
+            Some(_) if in_other_unit(text, key).is_some() => {
+                let number = in_other_unit(text, key).unwrap_or_default();
+                format!("write {number}, which is {text} in the key's unit")
+            }
             Some(number) if number == text => format!("write it without quotes: {number}"),
             Some(number) => {
                 format!("write it without quotes and unit: {number}; a key's ending is its unit")
@@ -82,7 +89,11 @@ pub(super) fn correction(expected: &str, value: &Value, written: &str) -> String
         ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
             format!("write it in quotes: \"{written}\"")
         }
-        ("integer", Value::Float(it)) if it.is_finite() => format!("write {it:.0}"),
+        ("integer", Value::Float(it)) if it.fract() == 0.0 => format!("write {it:.0}"),
+        ("integer", Value::Float(_)) if parts_thousands(written) => {
+            let whole = written.replace('.', "");
+            format!("give a whole number: {whole}, where the point parts thousands")
+        }
         ("array", Value::Table(_)) => "write a list: [...]".into(),
         ("array", _) => "write it in brackets: [...]".into(),
         ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
@@ -95,6 +106,18 @@ pub(super) fn correction(expected: &str, value: &Value, written: &str) -> String
         ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),
         _ => format!("give {}", in_words(expected)),
     }
+}
+
+/// `"0.01 um"` of a key in nanometres.
+fn in_other_unit(text: &str, key: &str) -> Option<String> {
+    let (number, unit) = split_unit(text.trim())?;
+    let other = unit::converted(number, unit?, key)?;
+    (other.parse() != number.parse::<f64>()).then_some(other)
+}
+
+fn parts_thousands(written: &str) -> bool {
+    let part = written.split_once('.').map(|it| it.1);
+    part.is_some_and(|it| it.len() == 3 && it.chars().all(|it| it.is_ascii_digit()))
 }
 
 /// The number of a text that is one, with a unit or without.

@@ -239,6 +239,7 @@ fn what_is_proposed_is_a_line_that_the_section_takes() {
         "0.2 +/- 0.05",
         "0.2 0.2",
         "0..2",
+        "0.2.",
         "0.2^M",
         "0.0002 mm",
         "″0.2″",
@@ -254,7 +255,7 @@ fn what_is_proposed_is_a_line_that_the_section_takes() {
     for value in ["115,200", "115.200,0", "115 200", "1l5200", "0115200"] {
         check_meant(LINEAR, from, &format!("{rate}{value}"), "115200");
     }
-    for value in ["3.0-", "- 3.0", "--3.0", "+-3.0", "−3,0", "-3.0 (below)"] {
+    for value in ["- 3.0", "--3.0", "+-3.0", "−3,0", "-3.0 (below)"] {
         let to = format!("soft_min_mm = {value}");
         check_meant(LINEAR, "soft_min_mm = -3.0", &to, "-3.0");
     }
