@@ -1,8 +1,17 @@
-//! How long a move takes at least.
+//! How long a move takes at least, and what is too long to wait for.
 
 use core::time::Duration;
 
-use units::ShortSpan;
+use units::{Short, ShortSpan};
+
+use super::judge::Judge;
+
+/// A run that is longer than a shift.
+pub(crate) const RUN_MAX_S: f64 = 8.0 * 3600.0;
+/// Nobody waits so long beside a move that hangs.
+const HANGS_MAX_S: f64 = 600.0;
+/// What takes time may take so much longer than it must, whatever settles.
+const HANGS_TIMES: f64 = 20.0;
 
 /// How long a way takes at least, from rest to rest; a short one never reaches the speed.
 pub(crate) fn least_time(way: f64, speed: f64, acceleration: f64) -> f64 {
@@ -15,6 +24,39 @@ pub(crate) fn least_time(way: f64, speed: f64, acceleration: f64) -> f64 {
 /// A time for people, however long.
 pub(crate) fn span(seconds: f64) -> ShortSpan {
     ShortSpan(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
+}
+
+/// Whether one that hangs, of those that take `needed_s`, is given up after `limit_s` only when nobody waits any more.
+pub(crate) fn hangs(limit_s: f64, needed_s: f64) -> bool {
+    limit_s > HANGS_MAX_S.max(HANGS_TIMES * needed_s)
+}
+
+/// A search for an index: over `travel_mm` of the way that is called `way`, and given up after `limit_s`, which `key` says.
+pub(crate) fn check_search(
+    judge: &mut Judge<'_>,
+    (way, travel_mm): (&str, f64),
+    speed_mm_per_s: f64,
+    (key, limit_s): (&str, f64),
+) {
+    let needed_s = travel_mm / speed_mm_per_s;
+    let cause = |end: &str| {
+        format!(
+            "{way} takes {} at {} mm/s, and {end} after {}",
+            span(needed_s),
+            Short(speed_mm_per_s),
+            span(limit_s)
+        )
+    };
+    if needed_s > limit_s {
+        judge.say(
+            key,
+            cause("the search is given up"),
+            "raise it, or search faster",
+        );
+    } else if hangs(limit_s, needed_s) {
+        let help = "give some times what the way takes";
+        judge.say(key, cause("one that hangs is noticed"), help);
+    }
 }
 
 #[cfg(test)]

@@ -80,6 +80,15 @@ impl MachineConfig {
         }
     }
 
+    /// From one sample of an analog module to the next, in seconds; nothing where it is not known.
+    pub(crate) fn sample_period_s(&self, module: &str) -> f64 {
+        let period = self.analog.get(module).and_then(|it| {
+            let bus = self.can.get(&it.node()?.bus)?;
+            Some(bus.sync_period().as_secs_f64() * f64::from(it.every_syncs()?))
+        });
+        period.unwrap_or(0.0)
+    }
+
     /// Its certificates, to be read.
     pub(crate) fn certificates_mut(&mut self) -> Vec<Named<'_>> {
         let instruments = self.instrument.iter_mut();

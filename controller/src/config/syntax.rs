@@ -169,8 +169,10 @@ fn slip(line: &str, whole: &str, count: usize, (schema, wanted): (&Schema, &Want
     let informed = || informed::of_line(line, at, wanted);
     let is_taken = |it: &Slip| it.meant.as_deref().is_some_and(|it| wanted.takes(it));
     match goes_on(line) {
-        Some(_) if count == 1 && is_taken(&informed()) => informed(),
-        Some(end) => slips::of_lines(line, whole, end, count),
+        Some(end) => (count == 1)
+            .then(informed)
+            .filter(is_taken)
+            .unwrap_or_else(|| slips::of_lines(line, whole, end, count)),
         None => headings::of_schema(line, schema).unwrap_or_else(informed),
     }
 }

@@ -5,14 +5,10 @@ use units::Short;
 use super::AxisConfig;
 use super::DriveConfig;
 use super::judge::{Finding, Judge};
-use super::least_time::{least_time, span};
+use super::least_time::{hangs, least_time, span};
 use super::model::MachineConfig;
 use crate::rotary::RotaryConfig;
 
-/// Nobody waits so long beside a move that hangs.
-const HANGS_MAX_S: f64 = 600.0;
-/// A move over the whole travel may take so much longer than it must, whatever settles.
-const HANGS_MOVES: f64 = 20.0;
 /// A shorter time within the window is somebody's wish, however short the moves are.
 const STANDS_MAX_S: f64 = 1.0;
 
@@ -178,7 +174,7 @@ impl Watched {
 
     fn hanging(&self, judge: &mut Judge<'_>) {
         let limit_s = self.move_timeout_s;
-        if limit_s > HANGS_MAX_S.max(HANGS_MOVES * self.least_s) {
+        if hangs(limit_s, self.least_s) {
             let cause = format!(
                 "a move that hangs is noticed after {}, and {} takes {}",
                 span(limit_s),

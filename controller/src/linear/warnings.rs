@@ -8,13 +8,12 @@ use machine::Stage;
 use units::{Metres, Short, ShortSpan};
 
 use crate::config::judge::{Finding, Judge};
+use crate::config::least_time::RUN_MAX_S;
 use crate::config::{AxisConfig, MachineConfig};
 use crate::linear::run_plan::{RunPlan, plan_of, speed_of};
 
 /// Fewer counts than this within which an axis must stand: it never does, when its last digit flickers.
 const WINDOW_COUNTS: f64 = 2.0;
-/// Longer than a shift: somebody has taken milliseconds for something else.
-const RUN_MAX_S: f64 = 8.0 * 3600.0;
 /// A target that is nearer to a calibrated position than this share of the step shows nothing between.
 const SAME_PLACE: f64 = 0.02;
 

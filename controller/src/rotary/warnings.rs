@@ -4,14 +4,12 @@ use units::Short;
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::span;
+use crate::config::least_time::{RUN_MAX_S, span};
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig};
 
 const TURN_ARCSEC: f64 = 1_296_000.0;
 /// Fewer counts than this within which a table must stand: it never does, when its last digit flickers.
 const WINDOW_COUNTS: f64 = 2.0;
-/// Longer than a shift.
-const RUN_MAX_S: f64 = 8.0 * 3600.0;
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     for (name, table) in &config.rotary {

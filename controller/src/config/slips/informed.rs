@@ -17,12 +17,12 @@ pub(in crate::config) fn of_line(line: &str, at: usize, wanted: &Wanted<'_>) -> 
     if slip.is_comment {
         return no_comment(slip, line, wanted);
     }
-    if !slip.is_ambiguous && (!is_key || is_taken) {
-        return slip;
-    }
     let parts = Parts::of(line);
     if slip.is_ambiguous {
         return of_two(slip, &parts, wanted);
+    }
+    if !is_key || is_taken {
+        return slip;
     }
     subsection(&parts, wanted)
         .or_else(|| reversed(&parts, wanted))

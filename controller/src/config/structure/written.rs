@@ -7,11 +7,9 @@ use crate::config::unit::{self, is_unit, split_unit};
 /// A value of another type as it was meant.
 pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Value> {
     match (expected, value) {
-        ("number", Value::String(text)) if in_other_unit(text, key).is_some() => {
-            in_other_unit(text, key)?.parse().ok().map(Value::Float)
-        }
         ("number", Value::String(text)) => {
-            let number = number_in(text)?.trim();
+            let other = in_other_unit(text, key);
+            let number = other.as_deref().or_else(|| number_in(text))?.trim();
             number.parse().ok().map(Value::Float)
         }
         ("integer", Value::String(text)) => {
@@ -66,17 +64,20 @@ pub(super) const fn kind(value: &Value) -> &'static str {
 /// What to write instead of a value of `key` that stands in the file as `written`.
 pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &str)) -> String {
     match (expected, value) {
-        ("number" | "integer", Value::String(text)) => match number_in(text) {
-            Some(_) if in_other_unit(text, key).is_some() => {
-                let number = in_other_unit(text, key).unwrap_or_default();
-                format!("write {number}, which is {text} in the key's unit")
+        ("number" | "integer", Value::String(text)) => {
+            match (in_other_unit(text, key), number_in(text)) {
+                (Some(number), _) => format!("write {number}, which is {text} in the key's unit"),
+                (None, Some(number)) if number == text => {
+                    format!("write it without quotes: {number}")
+                }
+                (None, Some(number)) => {
+                    format!(
+                        "write it without quotes and unit: {number}; a key's ending is its unit"
+                    )
+                }
+                (None, None) => format!("give {}", in_words(expected)),
             }
-            Some(number) if number == text => format!("write it without quotes: {number}"),
-            Some(number) => {
-                format!("write it without quotes and unit: {number}; a key's ending is its unit")
-            }
-            None => format!("give {}", in_words(expected)),
-        },
+        }
         ("boolean", Value::String(text)) => match truth(text) {
             Some(it) => format!("write it without quotes: {it}"),
             None => "give true or false".into(),

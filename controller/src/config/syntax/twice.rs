@@ -25,11 +25,11 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
             .count()
             + 1;
         let place = Place::at(lines, number);
-        let (cause, help) = match has_begun_again(lines, number, &place) {
+        let is_again = has_begun_again(lines, number, &place);
+        let (cause, help) = match is_again {
             true => again(&place),
             false => place.told(),
         };
-        let is_again = has_begun_again(lines, number, &place);
         found.contested.push(place.key());
         found.findings.push(Diagnostic {
             file: file.to_owned(),

@@ -4,13 +4,11 @@ use machine::Stage;
 use units::Short;
 
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::span;
+use crate::config::least_time::{RUN_MAX_S, span};
 use crate::config::{AxisConfig, InstrumentDevice, MachineConfig};
 use crate::linear::run_plan::{RunPlan, plan_of};
 use crate::linear::{CompensationConfig, VerifyConfig};
 
-/// Longer than a shift.
-const RUN_MAX_S: f64 = 8.0 * 3600.0;
 /// Less than this share of the soft limits' range is seldom all that is to be corrected.
 const COVERED_SHARE: f64 = 0.5;
 /// Errors of this share of the travel are no errors of a stage.

@@ -3,13 +3,10 @@
 use units::Short;
 
 use crate::config::judge::Judge;
-use crate::config::least_time::span;
+use crate::config::least_time::{hangs, span};
 use crate::config::{AxisConfig, MachineConfig};
 use crate::linear::ZeroConfig;
 
-/// Longer than the search takes this many times: nobody waits beside a search that hangs.
-const HANGS_SEARCHES: f64 = 20.0;
-const HANGS_MAX_S: f64 = 600.0;
 /// Samples are taken standing at so many places.
 const PLACES: f64 = 3.0;
 /// A converter that reaches so many times the rails of its sensors is another one.
@@ -74,7 +71,7 @@ fn check_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig) {
 
 /// How long the search takes over its whole way, there and at the places where it stands.
 fn check_time(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) {
-    let period_s = sample_period_s(config, zero);
+    let period_s = config.sample_period_s(&zero.analog);
     let standing_s = PLACES * zero.samples as f64 * period_s;
     if standing_s > zero.time_limit_s {
         return judge.say(
@@ -102,7 +99,7 @@ fn check_time(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) 
     if needed_s > zero.time_limit_s {
         let help = "raise it, or search faster or less far";
         judge.say("zero.time_limit_s", cause("is given up"), help);
-    } else if zero.time_limit_s > HANGS_MAX_S.max(HANGS_SEARCHES * needed_s) {
+    } else if hangs(zero.time_limit_s, needed_s) {
         let help = "give some times what the search takes";
         judge.say(
             "zero.time_limit_s",
@@ -110,16 +107,6 @@ fn check_time(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) 
             help,
         );
     }
-}
-
-/// From one sample of the sensors to the next; nothing where it is not known.
-fn sample_period_s(config: &MachineConfig, zero: &ZeroConfig) -> f64 {
-    let analog = config.analog.get(&zero.analog);
-    let period = analog.and_then(|it| {
-        let bus = config.can.get(&it.node()?.bus)?;
-        Some(bus.sync_period().as_secs_f64() * f64::from(it.every_syncs()?))
-    });
-    period.unwrap_or(0.0)
 }
 
 fn check_full_scale(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) {

@@ -4,14 +4,10 @@ use compensator::platform::Pose;
 use units::{Metres, Radians, Short};
 
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::span;
+use crate::config::least_time;
 use crate::config::{AxisConfig, MachineConfig};
 use crate::platform::config::{ActuatorConfig, PlatformCalibrateConfig};
 use crate::platform::{PlatformConfig, kinematics};
-
-/// Longer than the way takes this many times: nobody waits beside a search that hangs.
-const HANGS_WAYS: f64 = 20.0;
-const HANGS_MAX_S: f64 = 600.0;
 
 pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, platform: &PlatformConfig) {
     let mut longest_mm = 0.0_f64;
@@ -90,23 +86,9 @@ fn check_lead(judge: &mut Judge<'_>, platform: &PlatformConfig, screw: &Actuator
 
 fn check_search(judge: &mut Judge<'_>, platform: &PlatformConfig, longest_mm: f64) {
     let zero = &platform.zero;
-    let needed_s = longest_mm / zero.search_speed_mm_per_s;
-    let cause = |end: &str| {
-        format!(
-            "a travel of {} mm takes {} at {} mm/s, and {end} after {}",
-            Short(longest_mm),
-            span(needed_s),
-            Short(zero.search_speed_mm_per_s),
-            span(zero.time_limit_s)
-        )
-    };
-    if needed_s > zero.time_limit_s {
-        let help = "raise it, or search faster";
-        judge.say("time_limit_s", cause("the search is given up"), help);
-    } else if zero.time_limit_s > HANGS_MAX_S.max(HANGS_WAYS * needed_s) {
-        let help = "give some times what the way takes";
-        judge.say("time_limit_s", cause("one that hangs is noticed"), help);
-    }
+    let way = format!("a travel of {} mm", Short(longest_mm));
+    let limit = ("time_limit_s", zero.time_limit_s);
+    least_time::check_search(judge, (&way, longest_mm), zero.search_speed_mm_per_s, limit);
 }
 
 /// How far the screws go within the work range, against what of them is measured.

@@ -110,7 +110,7 @@ fn check_ends(judge: &mut Judge<'_>, axis: &AxisConfig, beam: &BeamConfig) {
 fn check_detector(judge: &mut Judge<'_>, config: &MachineConfig, detector: &BeamDetectorConfig) {
     check_intensity(judge, detector);
     check_range(judge, detector);
-    let period_s = period_s(config, &detector.analog);
+    let period_s = config.sample_period_s(&detector.analog);
     check_age(judge, period_s, detector.age_max_ms);
     check_stuck(judge, period_s, detector.stuck_samples);
 }
@@ -200,7 +200,7 @@ fn check_roll(judge: &mut Judge<'_>, config: &MachineConfig, roll: &RollConfig) 
             "check both: they are in seconds of arc",
         );
     }
-    let period_s = period_s(config, &roll.analog);
+    let period_s = config.sample_period_s(&roll.analog);
     check_age(judge, period_s, roll.age_max_ms);
     check_stuck(judge, period_s, roll.stuck_samples);
 }
@@ -232,19 +232,9 @@ fn check_temperature(judge: &mut Judge<'_>, config: &MachineConfig, own: &Temper
             );
         }
     }
-    let period_s = period_s(config, &own.analog);
+    let period_s = config.sample_period_s(&own.analog);
     check_age(judge, period_s, own.age_max_ms);
     check_stuck(judge, period_s, own.stuck_samples);
-}
-
-/// From one sample of a module to the next; nothing where it is not known.
-fn period_s(config: &MachineConfig, analog: &str) -> f64 {
-    let module = config.analog.get(analog);
-    let period = module.and_then(|it| {
-        let bus = config.can.get(&it.node()?.bus)?;
-        Some(bus.sync_period().as_secs_f64() * f64::from(it.every_syncs()?))
-    });
-    period.unwrap_or(0.0)
 }
 
 fn check_age(judge: &mut Judge<'_>, period_s: f64, age_max_ms: f64) {

@@ -4,18 +4,13 @@ use compensator::volumetric::Axis;
 use units::Short;
 
 use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::span;
+use crate::config::least_time::{self, RUN_MAX_S, span};
 use crate::config::{AxisConfig, InstrumentConfig, MachineConfig};
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::config::VolumetricCalibrateConfig;
 
 /// Less than this share of an axis's travel is seldom all that it works in.
 const COVERED_SHARE: f64 = 0.5;
-/// Longer than the way takes this many times: nobody waits beside a search that hangs.
-const HANGS_WAYS: f64 = 20.0;
-const HANGS_MAX_S: f64 = 600.0;
-/// Longer than a shift.
-const RUN_MAX_S: f64 = 8.0 * 3600.0;
 
 pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, volume: &VolumetricConfig) {
     let judge = &mut Judge::at("volumetric".into(), found);
@@ -84,27 +79,9 @@ fn check_axis(judge: &mut Judge<'_>, volume: &VolumetricConfig, (at, axis): (usi
 
 fn check_search(judge: &mut Judge<'_>, volume: &VolumetricConfig, (name, travel_mm): (&str, f64)) {
     let zero = &volume.zero;
-    let needed_s = travel_mm / zero.search_speed_mm_per_s;
-    let cause = |end: &str| {
-        format!(
-            "the travel of axis {name}, {} mm, takes {} at {} mm/s, and {end} after {}",
-            Short(travel_mm),
-            span(needed_s),
-            Short(zero.search_speed_mm_per_s),
-            span(zero.time_limit_s)
-        )
-    };
-    if needed_s > zero.time_limit_s {
-        let help = "raise it, or search faster";
-        judge.say("zero.time_limit_s", cause("the search is given up"), help);
-    } else if zero.time_limit_s > HANGS_MAX_S.max(HANGS_WAYS * needed_s) {
-        let help = "give some times what the way takes";
-        judge.say(
-            "zero.time_limit_s",
-            cause("one that hangs is noticed"),
-            help,
-        );
-    }
+    let way = format!("the travel of axis {name}, {} mm,", Short(travel_mm));
+    let limit = ("zero.time_limit_s", zero.time_limit_s);
+    least_time::check_search(judge, (&way, travel_mm), zero.search_speed_mm_per_s, limit);
 }
 
 /// One line along each axis is the least that is read.
