@@ -13,6 +13,7 @@ use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
 use super::model::MachineConfig;
 use super::place::{Part, span_of};
+use super::relocated::relocated;
 use super::repair::{Repair, repaired};
 use super::schema;
 use super::structure::{self, Unread};
@@ -164,11 +165,13 @@ fn read_by<C: DeserializeOwned>(
         Err(error) => {
             let recovered = syntax::recovered(text, file, schema);
             match recovered.text.parse::<Table>() {
-                Ok(document) => (document, recovered),
-                Err(_) => return Err(unreadable(text, file, &error)),
+                // Where no line is wrong by itself, what is wrong with the whole is told.
+                Ok(document) if !recovered.findings.is_empty() => (document, recovered),
+                _ => return Err(unreadable(text, file, &error)),
             }
         }
     };
+    let (document, relocated) = relocated(document, schema);
     let (document, regrouped) = structure::regrouped(document, schema);
     let unread = Unread {
         keys: &recovered.unread,
@@ -177,6 +180,7 @@ fn read_by<C: DeserializeOwned>(
     };
     let found = structure::judge((&document, &recovered.text), schema, unread);
     let (mut findings, repairs) = (found.findings, found.repairs);
+    findings.extend(relocated);
     findings.extend(regrouped);
     let config = Value::Table(repaired(document, &repairs)).try_into::<C>();
     let is_sound = findings.is_empty() && recovered.findings.is_empty();
@@ -215,8 +219,31 @@ fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> 
     // A word where a number belongs is told as that.
     let mistaken: Vec<_> = found.iter().filter(is_mistaken).map(|it| it.line).collect();
     let of_syntax = recovered.findings.into_iter();
-    found.extend(of_syntax.filter(|it| !mistaken.contains(&it.line)));
-    found.sort_by_key(|it| (it.line, it.column));
+    let of_syntax: Vec<_> = of_syntax
+        .filter(|it| !mistaken.contains(&it.line))
+        .collect();
+    // What a section lacks may be what cannot be read of it: that is told first.
+    let told_at = |it: &Diagnostic| {
+        let lines = of_syntax
+            .iter()
+            .filter(|own| it.cause.starts_with("missing") && is_within(&own.key, &it.key));
+        let last = lines.map(|own| own.line).max();
+        (
+            last.unwrap_or_default().max(it.line),
+            last.is_some(),
+            it.column,
+        )
+    };
+    found.sort_by_key(told_at);
+    let places: Vec<_> = found.iter().map(told_at).collect();
+    let mut all: Vec<_> = places.into_iter().zip(found).collect();
+    all.extend(
+        of_syntax
+            .into_iter()
+            .map(|it| ((it.line, false, it.column), it)),
+    );
+    all.sort_by_key(|it| it.0);
+    let found = all.into_iter().map(|it| it.1).collect();
     ConfigError::Invalid { findings: found }
 }
 

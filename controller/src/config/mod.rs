@@ -12,6 +12,7 @@ mod device_warnings;
 mod diagnostic;
 #[cfg(feature = "program")]
 pub(crate) mod explained;
+mod foreign;
 #[cfg(test)]
 mod impossible_tests;
 pub(crate) mod judge;
@@ -26,6 +27,7 @@ mod mutated_tests;
 mod place;
 #[cfg(test)]
 mod reference;
+mod relocated;
 mod repair;
 pub(crate) mod schema;
 mod slips;

@@ -69,7 +69,7 @@ pub(super) fn of_line(line: &str, at: usize) -> Slip {
 
 fn nothing_known(parts: &Parts<'_>) -> Slip {
     let cause = format!("`{}` cannot be read", shown(parts.said.trim()));
-    let help = "remove it, or begin it with #; a line is `key = value`, `[section]`, or a comment";
+    let help = "a line is `key = value`, `[section]`, or a remark that begins with #";
     Slip {
         is_unknown: true,
         ..Slip::new(0, cause, help.into(), None)

@@ -1,7 +1,8 @@
 //! Whether a file has the keys, types and ranges that its schema says.
 
+mod moved;
 mod named;
-mod places;
+pub(in crate::config) mod places;
 mod regrouped;
 mod section;
 mod unknown;
@@ -20,6 +21,7 @@ use super::meant::word_meant;
 use super::place::{Part, span_of};
 use super::repair::Repair;
 use super::schema::{DEVICE, type_of, without_null};
+use moved::Moved;
 use named::named;
 pub(super) use regrouped::regrouped;
 use section::Section;
@@ -47,10 +49,13 @@ pub(super) struct Found<'a> {
     pub(super) repairs: Vec<Repair>,
     unread: Unread<'a>,
     schema: &'a Schema,
+    document: &'a Table,
     /// The file as it stands.
     text: &'a str,
     /// Whether keys stand in a section that lacks its name: what is missing may be theirs.
     has_nameless: bool,
+    /// Keys that are not known where they stand, and keys that are missing, each with its finding.
+    moved: Moved,
     /// The sections that are being judged, from the outermost on, with the keys that they could still have.
     above: Vec<(String, Vec<String>)>,
 }
@@ -90,7 +95,7 @@ impl Found<'_> {
 
 /// All that is not as `schema` says.
 pub(super) fn judge<'a>(
-    (document, text): (&Table, &'a str),
+    (document, text): (&'a Table, &'a str),
     schema: &'a Schema,
     unread: Unread<'a>,
 ) -> Found<'a> {
@@ -99,23 +104,29 @@ pub(super) fn judge<'a>(
         repairs: Vec::new(),
         unread,
         schema,
+        document,
         text,
         has_nameless: false,
+        moved: Moved::default(),
         above: Vec::new(),
     };
     table("", document, schema, &mut found);
+    moved::join(&mut found);
     found
 }
 
 /// Whether a value can be what `schema` says.
 pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
+    let document = Table::new();
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
         unread: Unread::default(),
         schema,
+        document: &document,
         text: "",
         has_nameless: false,
+        moved: Moved::default(),
         above: Vec::new(),
     };
     any("", value, schema, &mut found);
@@ -193,9 +204,9 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     let names = free.iter().map(|it| (*it).to_owned());
     found.above.push((path.to_owned(), names.collect()));
     let orphans = orphans((path, seen), &section, &free, found.schema);
-    let orphans = orphans.filter(|(keys, _)| keys.iter().all(|it| found.home_of(it).is_none()));
-    if let Some((keys, home)) = &orphans {
-        tell_orphans(path, keys, home, found);
+    let orphans = orphans.filter(|(keys, ..)| keys.iter().all(|it| found.home_of(it).is_none()));
+    if let Some((keys, home, is_list)) = &orphans {
+        tell_orphans(path, (keys, home, *is_list), found);
     }
     let mut mistyped = Vec::new();
     for (key, value) in seen {
@@ -236,6 +247,8 @@ fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
         false => format!("`{key}`"),
     };
     let help = format!("add {what}; configs/README.md describes every key");
+    let at = found.findings.len();
+    found.moved.add_lacking(at, path, key);
     say(found, path, format!("missing {what}"), help);
 }
 

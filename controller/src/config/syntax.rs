@@ -9,6 +9,7 @@ use serde_json::Value as Schema;
 use toml::de::DeTable;
 
 use super::diagnostic::{Diagnostic, shown};
+use super::foreign::{self, Around, Foreign};
 use super::lines::below;
 use super::slips::{self, End, Slip, goes_on, headings, informed, is_toml};
 use super::wanted::Wanted;
@@ -75,6 +76,43 @@ impl Recovered {
     }
 }
 
+impl Recovered {
+    /// What is wrong with a section of another language, `before` lines into the file; gives its lines as they were meant.
+    fn note_foreign(
+        &mut self,
+        foreign: Foreign,
+        section: &mut Section,
+        (before, file): (usize, &str),
+    ) -> Vec<String> {
+        let line = before + 1;
+        self.has_lost_heading |= foreign.path.is_none();
+        let tell = |line, key: String, cause: String, help: String| Diagnostic {
+            file: file.to_owned(),
+            line,
+            column: 1,
+            key,
+            cause,
+            help,
+        };
+        let key = foreign.path.unwrap_or_else(|| section.path.clone());
+        self.findings
+            .push(tell(line, key, foreign.cause, foreign.help));
+        for (at, key, help) in foreign.unread {
+            self.unread.push(key.clone());
+            self.findings.push(tell(
+                line + at,
+                key,
+                "its value cannot be read as it is written here".into(),
+                help,
+            ));
+        }
+        for line in &foreign.meant {
+            section.enter(line);
+        }
+        foreign.meant
+    }
+}
+
 /// How many lines are of a section whose name cannot be read.
 fn lost(lines: &[&str]) -> usize {
     let next = lines
@@ -93,9 +131,26 @@ pub(super) fn recovered(text: &str, file: &str, schema: &Schema) -> Recovered {
     let mut kept: Vec<String> = Vec::with_capacity(lines.len());
     let mut section = Section::default();
     let mut at = 0;
+    let headings: Vec<&str> = lines
+        .iter()
+        .filter(|it| is_header(it))
+        .map(|it| name_of(it))
+        .collect();
     while let Some(line) = lines.get(at) {
         let count = extent(&lines[at..]);
         let whole = lines[at..at + count].join("\n");
+        let around = Around {
+            schema,
+            section: &section.path,
+            headings: &headings,
+        };
+        if !is_toml(&whole)
+            && let Some(foreign) = foreign::of(&lines[at..], &around)
+        {
+            at += foreign.count;
+            kept.extend(found.note_foreign(foreign, &mut section, (kept.len(), file)));
+            continue;
+        }
         match is_toml(&whole) {
             true => {
                 section.enter(line);

@@ -44,6 +44,16 @@ pub(super) fn is_known(unit: &str) -> bool {
     size(unit).is_some()
 }
 
+/// Whether nobody knows how much of the key's own unit it is: another quantity, or a unit that is not known.
+pub(super) fn is_another(unit: &str, key: &str) -> bool {
+    // A letter by itself was a slip of the hand.
+    let is_other = |own: (String, f64)| match size(unit) {
+        Some(it) => it.0 != own.0,
+        None => unit.chars().nth(1).is_some(),
+    };
+    unit_of(key).is_some_and(is_other)
+}
+
 /// `number` of `unit` in the unit that `key` ends with: 0.05 mm are 50.0 of `position_window_um`.
 pub(super) fn converted(number: &str, unit: &str, key: &str) -> Option<String> {
     let unit = unit.replace('²', "2").replace('³', "3").replace('^', "");
@@ -82,21 +92,21 @@ fn size(unit: &str) -> Option<(String, f64)> {
         "m" => ("length", 1.0),
         "cm" => ("length", 1e-2),
         "mm" => ("length", 1e-3),
-        "um" | "µm" | "μm" => ("length", 1e-6),
+        "um" | "µm" | "μm" | "micron" | "microns" => ("length", 1e-6),
         "nm" => ("length", 1e-9),
-        "in" | "inch" => ("length", 0.0254),
-        "s" | "sec" => ("time", 1.0),
+        "in" | "inch" | "inches" => ("length", 0.0254),
+        "s" | "sec" | "second" | "seconds" => ("time", 1.0),
         "ms" => ("time", 1e-3),
         "us" | "µs" | "μs" => ("time", 1e-6),
-        "min" => ("time", 60.0),
+        "min" | "minutes" => ("time", 60.0),
         "h" | "hr" => ("time", 3600.0),
         "s2" => ("time2", 1.0),
         "s3" => ("time3", 1.0),
         "%" | "percent" => ("share", 1e-2),
         "ppm" => ("share", 1e-6),
-        "V" | "v" => ("voltage", 1.0),
+        "V" | "v" | "volt" | "volts" => ("voltage", 1.0),
         "mV" | "mv" => ("voltage", 1e-3),
-        "deg" | "°" => ("angle", 3600.0 * ARC_SECOND),
+        "deg" | "°" | "degree" | "degrees" => ("angle", 3600.0 * ARC_SECOND),
         "arcsec" | "″" => ("angle", ARC_SECOND),
         "arcmin" | "′" => ("angle", 60.0 * ARC_SECOND),
         "rad" => ("angle", 1.0),

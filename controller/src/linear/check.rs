@@ -189,15 +189,28 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
             "is not above delta1",
             "the flanks lie well below the peak",
         );
-    } else if (0.1..=1e5).contains(&zero.time_limit_s)
+    } else if axis.motion.has_travel()
+        && (0.1..=1e5).contains(&zero.time_limit_s)
         && let Err(error) = assemble::hall_settings(zero, &axis.motion).validate()
     {
-        judge.say(
-            key_of(&error),
-            error.to_string(),
-            "vc is `level_below_peak_v`, vc0 is `turn_below_peak_v`",
-        );
+        let cause = in_keys(&error.to_string());
+        judge.say(key_of(&error), cause, "change one of them");
     }
+}
+
+/// An error with the keys of a file in place of the method's own names.
+fn in_keys(error: &str) -> String {
+    let said = error.strip_prefix("hall zero: ").unwrap_or(error);
+    let words = said.split(' ').map(|word| match word {
+        "vc" => "`level_below_peak_v`",
+        "vc0" => "`turn_below_peak_v`",
+        "delta1" => "`delta1_mv`",
+        "delta2" => "`delta2_mv`",
+        "delta3" => "`delta3_mv`",
+        "delta4" => "`delta4_mv`",
+        other => other,
+    });
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// The key of the one setting that an error is about, if it is about one.
@@ -259,6 +272,9 @@ fn check_range(
 ) {
     let overrun = longest_approach_mm(axis, overrun);
     judge.below((start_key, start), (end_key, end));
+    if !axis.motion.has_travel() {
+        return;
+    }
     // Without it the first and the last target have no approach of their own.
     let reachable = axis.motion.soft_min_mm..=axis.motion.soft_max_mm;
     if !reachable.contains(&-overrun) {

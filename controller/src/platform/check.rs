@@ -191,7 +191,7 @@ fn check_travel(
         };
         let fits = strokes.first_mm - run.overrun_mm >= axis.motion.soft_min_mm
             && strokes.last_mm + run.overrun_mm <= axis.motion.soft_max_mm;
-        if !fits {
+        if !fits && axis.motion.has_travel() {
             judge.say(
                 "",
                 format!(

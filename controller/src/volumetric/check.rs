@@ -99,7 +99,7 @@ fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volu
         let (low, high) = (volumetric.low_mm[at], volumetric.high_mm[at]);
         let fits =
             low - room_mm >= axis.motion.soft_min_mm && high + room_mm <= axis.motion.soft_max_mm;
-        if !fits {
+        if !fits && axis.motion.has_travel() {
             judge.say(
                 "low_mm",
                 format!(
@@ -136,7 +136,7 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             axis.motion.speed_max_mm_per_s,
         );
         let inside = index_mm >= axis.motion.soft_min_mm && index_mm < axis.motion.soft_max_mm;
-        if !inside {
+        if !inside && axis.motion.has_travel() {
             judge.say(
                 "zero.index_mm",
                 format!("the index of axis {name} lies outside its soft limits"),

@@ -21,6 +21,9 @@ pub(in crate::config) fn of_line(line: &str, at: usize, wanted: &Wanted<'_>) -> 
     if slip.is_ambiguous {
         return of_two(slip, &parts, wanted);
     }
+    if let Some(slip) = by_dash(&parts, wanted) {
+        return slip;
+    }
     if !is_key || is_taken {
         return slip;
     }
@@ -31,6 +34,7 @@ pub(in crate::config) fn of_line(line: &str, at: usize, wanted: &Wanted<'_>) -> 
         .or_else(|| by_letter(line, wanted))
         .or_else(|| by_key(&parts, wanted))
         .or_else(|| by_separator(&parts, wanted))
+        .or_else(|| glued(&parts, wanted))
         .unwrap_or_else(|| without_invention(slip, &parts, wanted))
 }
 
@@ -77,7 +81,8 @@ fn by_value(parts: &Parts<'_>, slip: &Slip, wanted: &Wanted<'_>) -> Option<Slip>
         None => slip.cause.clone(),
     };
     let meant = parts.with(&value);
-    let has_remark = raw.len() > value.len() + 2;
+    let is_word = |it: &str| it.len() > 1 && it.chars().all(char::is_alphabetic) && !is_known(it);
+    let has_remark = raw.len() > value.len() + 2 && raw.split_whitespace().skip(1).any(is_word);
     let help = match has_remark {
         true => format!("write {}; a remark begins with #", shown(&value)),
         false => format!("write {}", shown(&value)),
@@ -134,10 +139,61 @@ fn reversed(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
 
 /// Something else than `=` parts the key and its value.
 fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
-    let line = parts
-        .said
-        .trim()
-        .trim_start_matches(['"', '\'', '“', '{', ' ']);
+    let said = entry(parts.said, wanted)?;
+    let cause = "a key and its value are parted by one `=`".to_owned();
+    let help = format!("write `{}`", shown(&said));
+    let meant = format!("{said} {}", parts.comment);
+    Some(Slip::new(0, cause, help, Some(meant)))
+}
+
+/// `key - 5.0`: a dash that may stand for the `=`, or be the sign.
+fn by_dash(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let (key, value) = parts.said.trim().split_once(" - ")?;
+    let (key, value) = (key.trim(), value.trim());
+    if parts.value.is_some() || !wanted.has(key) {
+        return None;
+    }
+    let value = loosely::read(value, key, wanted)?;
+    let [plain, minus] = ["", "-"].map(|sign| format!("{key} = {sign}{value}"));
+    let cause = "there is no `=` between a key and its value".to_owned();
+    // A key that takes no value below zero has no sign.
+    let is_either = wanted.takes(&minus) && value != "0";
+    let help = match is_either {
+        true => format!("write `{plain}`, or `{minus}` where the dash is its sign"),
+        false => format!("write `{plain}`"),
+    };
+    let meant = (!is_either).then(|| format!("{plain} {}", parts.comment));
+    Some(Slip {
+        key: is_either.then(|| key.to_owned()),
+        ..Slip::new(0, cause, help, meant)
+    })
+}
+
+/// `delta1_mv20.0`: nothing stands between a key and its value.
+fn glued(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
+    let line = parts.said.trim();
+    let keys = wanted.keys().into_iter();
+    let key = keys
+        .filter(|it| line.starts_with(it))
+        .max_by_key(|it| it.len())?;
+    let rest = line[key.len()..].trim();
+    let is_value = |it: char| it.is_ascii_digit() || "\"'[+".contains(it);
+    let value = loosely::read(rest, key, wanted).filter(|_| rest.starts_with(is_value))?;
+    let cause = "there is no `=` between a key and its value".to_owned();
+    let help = format!("write `{key} = {value}`");
+    Some(Slip::new(
+        0,
+        cause,
+        help,
+        Some(format!("{key} = {value} {}", parts.comment)),
+    ))
+}
+
+/// `key = value` of a line that parts them as other languages do: `"key": value,`, `<key>value</key>`.
+pub(in crate::config) fn entry(line: &str, wanted: &Wanted<'_>) -> Option<String> {
+    let element = element(line);
+    let line = element.as_deref().unwrap_or(line).trim();
+    let line = line.trim_start_matches(['"', '\'', '“', '{', ' ']);
     let end = line.find(|it| !is_of_key(it))?;
     let (key, rest) = line.split_at(end);
     let quote = rest.trim_start_matches(['"', '\'', '”', ' ']);
@@ -153,10 +209,15 @@ fn by_separator(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
         return None;
     }
     let value = loosely::read(rest, key, wanted)?;
-    let cause = "a key and its value are parted by one `=`".to_owned();
-    let help = format!("write `{key} = {}`", shown(&value));
-    let meant = format!("{key} = {value} {}", parts.comment);
-    Some(Slip::new(0, cause, help, Some(meant)))
+    Some(format!("{key} = {value}"))
+}
+
+/// `samples = 10` of `<samples>10</samples>`.
+pub(in crate::config) fn element(line: &str) -> Option<String> {
+    let (name, rest) = line.trim().strip_prefix('<')?.split_once('>')?;
+    let value = rest.strip_suffix(&format!("</{name}>"))?;
+    let is_meant = is_key(name) && !value.contains('<');
+    is_meant.then(|| format!("{name} = {value}"))
 }
 
 /// A value that goes on in the next line, as one line.
@@ -311,7 +372,10 @@ fn without_wrong_value(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Sl
     if !wanted.keys().is_empty() && !is_like && !is_key(parts.key) {
         return nothing_known(parts);
     }
-    match wanted.can_be(key).filter(|_| !wanted.fits_kind(meant)) {
+    // Two numbers that together are none that the key can have are two.
+    let is_two = parts.value.is_some_and(|it| it.contains(' ')) && !wanted.takes(meant);
+    let is_other = is_two || !wanted.fits_kind(meant);
+    match wanted.can_be(key).filter(|_| is_other) {
         Some(kind) => Slip {
             help: format!("give {kind}"),
             meant: None,

@@ -25,11 +25,18 @@ pub(super) fn read(raw: &str, key: &str, wanted: &Wanted<'_>) -> Option<String> 
 fn candidates(raw: &str, key: &str, schema: &Schema) -> Vec<String> {
     match type_of(schema) {
         "number" | "integer" => numbers(raw, key),
+        "boolean" => truth(raw).into_iter().collect(),
         "string" => text(raw).into_iter().collect(),
         "array" => list(raw, key, &schema["items"]).into_iter().collect(),
         "object" => section(raw, schema).into_iter().collect(),
         _ => Vec::new(),
     }
+}
+
+/// `True` and `FALSE`, as other languages write them.
+fn truth(raw: &str) -> Option<String> {
+    let word = raw.trim_end_matches([',', ';', ' ']).to_lowercase();
+    ["true", "false"].contains(&word.as_str()).then_some(word)
 }
 
 /// What stands around a number and is no part of it.
@@ -59,6 +66,10 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
     };
     let first = rest.split([' ', '(', '\t']).next().unwrap_or_default();
     let bare = rest.replace(['[', ']', '(', ')'], "").replace(',', ".");
+    // `1,000 mm` may be a metre, or a millimetre to its third decimal.
+    if rest != first && is_either(first) {
+        return Vec::new();
+    }
     let by_unit = split_unit(&bare).and_then(|(number, unit)| converted(number, unit?, key));
     // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
     let behind = rest[first.len()..].trim_start();
@@ -121,6 +132,18 @@ fn plain(text: &str) -> Vec<String> {
     // The last one parts thousands, too.
     found.extend(ungrouped(mantissa).map(|it| format!("{it}{exponent}")));
     found
+}
+
+/// Whether its comma may part thousands, or decimals.
+fn is_either(text: &str) -> bool {
+    let parts = text.split_once(',');
+    parts.is_some_and(|(whole, part)| {
+        is_digits(whole)
+            && whole.len() <= 3
+            && !whole.starts_with('0')
+            && is_digits(part)
+            && part.len() == 3
+    })
 }
 
 fn is_digits(text: &str) -> bool {

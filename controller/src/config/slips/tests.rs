@@ -25,7 +25,7 @@ fn numbers_say_how_they_are_written() {
         ("0X1f", "no number as it is written", "0x1f"),
         ("7FF", "no number as it is written", "0x7FF"),
         ("25c", "the unit is in the key's name", "25"),
-        ("10h", "the unit is in the key's name", "10"),
+        ("10 mm", "the unit is in the key's name", "10"),
         ("7FFh", "no number as it is written", "0x7FF"),
         ("$7FF", "no number as it is written", "0x7FF"),
         ("12.5 mm", "the unit is in the key's name", "12.5"),
@@ -44,6 +44,13 @@ fn numbers_say_how_they_are_written() {
         "x = 99999999999999999999",
         "larger than any",
         "smaller",
+        None,
+    );
+    // Of hours nobody knows how many millimetres they are.
+    check(
+        "x_mm = 10h",
+        "the unit is in the key's name",
+        "in the unit",
         None,
     );
     check("x = NaN", "`NaN` is no value here", "give a value", None);

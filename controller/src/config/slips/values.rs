@@ -2,7 +2,7 @@
 
 use super::{Parts, Slip};
 use crate::config::diagnostic::shown;
-use crate::config::unit::{converted, is_unit, split_unit};
+use crate::config::unit::{converted, is_another, is_unit, split_unit};
 
 pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
     let value = parts.value?;
@@ -65,6 +65,10 @@ fn with_a_unit(parts: &Parts<'_>, value: &str) -> Option<Slip> {
             let help = format!("write {other}, which is {number} {unit} in the key's unit");
             parts.value_meant(&other, cause, help)
         }
+        None if is_another(unit, parts.key) => {
+            let help = "give a number in the unit that the key ends with, and no unit behind it";
+            Some(Slip::new(parts.value_at, cause, help.into(), None))
+        }
         _ => {
             let help =
                 format!("write {number} without `{unit}`, in the unit that the key ends with");
@@ -104,7 +108,9 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     // Spaces part thousands; the same number twice was pasted twice.
     let mut groups = rest.split(' ');
     let first = groups.next().unwrap_or_default();
-    if rest.contains(' ') && !groups.all(|it| it.len() >= 3 && it != first) {
+    let is_grouped = !first.contains('.') && groups.all(|it| it.len() >= 3 && it != first);
+    // `5'` are minutes of arc.
+    if rest.contains(' ') && !is_grouped || rest.ends_with('\'') {
         return None;
     }
     let digits: String = rest.chars().filter(|it| !"'_ ".contains(*it)).collect();
@@ -142,9 +148,13 @@ fn hexadecimal(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let digits = digits.replace('_', "");
     let letters = digits.matches(|it: char| it.is_ascii_alphabetic()).count();
     // `10h` are hours and `20c` degrees.
-    let is_number =
-        marked.is_some() || digits.starts_with('0') || letters > 1 || digits.len() < value.len();
     let is_identity = HEXADECIMAL.contains(&parts.key);
+    // `20ed` was a slip of the hand, but in an identity; `7FF` is how such numbers are written.
+    let is_capital = !digits.contains(|it: char| it.is_ascii_lowercase());
+    let is_number = marked.is_some()
+        || digits.starts_with('0')
+        || letters > 1 && (is_identity || is_capital)
+        || digits.len() < value.len();
     let is_unit = marked.is_none() && letters == 0 && !digits.starts_with('0') && !is_identity;
     let is_digits = digits.starts_with(|it: char| marked.is_some() || it.is_ascii_digit())
         && digits.chars().all(|it| it.is_ascii_hexdigit());
@@ -224,6 +234,9 @@ fn quotes(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     }
     if let Some(slip) = behind_a_text(parts, value) {
         return Some(slip);
+    }
+    if value.ends_with(']') && value.contains(" [") {
+        return None;
     }
     let inner: String = inner.chars().filter(|it| !"\"'".contains(*it)).collect();
     let meant = format!("\"{inner}\"");

@@ -117,6 +117,10 @@ fn with_strays(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) ->
             _ => None,
         });
         let Some(meant) = meant else { continue };
+        if is_called(name, found.document) && !is_called(meant, found.document) {
+            misnamed(path, (meant, name), &mut whole, found);
+            continue;
+        }
         let key = below(path, name);
         whole.remove(name);
         if let Some(Value::Table(other)) = whole.get_mut(meant) {
@@ -131,6 +135,38 @@ fn with_strays(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) ->
         tell(found, key, cause, help);
     }
     whole
+}
+
+/// Whether a value of the file names it: the drive's bus, an axis' sensors.
+fn is_called(name: &str, table: &Table) -> bool {
+    let mut values = table.values();
+    values.any(|it| match it {
+        Value::String(word) => word == name,
+        Value::Table(inner) => is_called(name, inner),
+        Value::Array(items) => items.iter().any(|it| match it {
+            Value::String(word) => word == name,
+            Value::Table(inner) => is_called(name, inner),
+            _ => false,
+        }),
+        _ => false,
+    })
+}
+
+/// Of a section that all the file calls otherwise, sections of it included, the name is wrong.
+fn misnamed(path: &str, (seen, meant): (&str, &str), whole: &mut Table, found: &mut Found<'_>) {
+    let key = below(path, seen);
+    if let (Some(Value::Table(own)), Some(Value::Table(other))) =
+        (whole.remove(seen), whole.get_mut(meant))
+    {
+        join(other, own);
+    }
+    let cause = format!("nothing names [{key}], and the rest of the file names [{path}.{meant}]");
+    let help = format!("did you mean [{path}.{meant}]?");
+    found.repairs.push(Repair::Rename {
+        key: key.clone(),
+        to: meant.to_owned(),
+    });
+    tell(found, key, cause, help);
 }
 
 /// Whether there are only sections of it where it has keys of its own.

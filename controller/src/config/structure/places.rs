@@ -28,13 +28,18 @@ pub(super) fn of(schema: &Schema, key: &str) -> Option<String> {
 
 /// The section that has all of `keys`, the first of them.
 pub(super) fn of_all(schema: &Schema, keys: &[&str]) -> Option<String> {
+    with_all(schema, keys).into_iter().find(|it| !it.is_empty())
+}
+
+/// The sections that have all of `keys`.
+pub(in crate::config) fn with_all(schema: &Schema, keys: &[&str]) -> Vec<String> {
     let each = keys.iter().map(|key| {
         let mut found = Vec::new();
         walk(schema, "", key, &mut found);
         found
     });
     let common = each.reduce(|all, own| all.into_iter().filter(|it| own.contains(it)).collect());
-    common?.into_iter().find(|it| !it.is_empty())
+    common.unwrap_or_default()
 }
 
 fn walk(schema: &Schema, path: &str, key: &str, found: &mut Vec<String>) {

@@ -65,6 +65,7 @@ pub(super) fn unknown<'a>(
     }
     if is_anothers {
         tell(section.has_no_such_key(), "remove it".to_owned(), remove());
+        found.moved.add_strange(found.findings.len() - 1, name);
         return None;
     }
     // What must be there and is not comes first.
@@ -80,7 +81,11 @@ pub(super) fn unknown<'a>(
         (None, None, Some(key)) => (advice(meant, free), renamed(key), Some(key)),
         (None, None, None) => (elsewhere(schema, name, free), remove(), None),
     };
+    let is_own = meant.is_some_and(|it| section.required.contains(&it));
     tell("there is no such key here".to_owned(), help, repair);
+    if !is_own {
+        found.moved.add_strange(found.findings.len() - 1, name);
+    }
     let is_judged =
         section.part_meant(name, value).is_some() && !free.contains(&named.unwrap_or_default());
     if let (Some(named), Value::Table(_) | Value::Array(_), false) = (named, value, is_judged) {
@@ -106,7 +111,7 @@ pub(super) fn orphans<'a>(
     section: &Section<'_>,
     free: &[&str],
     schema: &Schema,
-) -> Option<(Vec<&'a str>, String)> {
+) -> Option<(Vec<&'a str>, String, bool)> {
     let strange = seen.iter().filter(|(key, value)| {
         let is_own = section.keys.contains_key(key.as_str()) || section.is_of_another_device(key);
         !is_own && !value.is_table() && key_meant(key, free).is_none()
@@ -114,28 +119,40 @@ pub(super) fn orphans<'a>(
     let strange: Vec<&str> = strange.map(|(key, _)| key.as_str()).collect();
     // A section of this one is nearer than any other.
     let has_all = |own: &Schema| {
-        let inner = &without_null(own)["properties"];
+        let own = without_null(own);
+        let inner = match own["items"].is_object() {
+            true => &own["items"]["properties"],
+            false => &own["properties"],
+        };
         strange.iter().all(|it| !inner[*it].is_null())
     };
     let inner = section.keys.iter().find(|(_, own)| has_all(own));
-    let home = match inner {
-        Some((name, _)) => below(path, name),
-        None => places::of_all(schema, &strange)?,
+    let (home, is_list) = match inner {
+        Some((name, own)) => (below(path, name), own["items"].is_object()),
+        None => (places::of_all(schema, &strange)?, false),
     };
-    (strange.len() > 1).then_some((strange, home))
+    (strange.len() > 1).then_some((strange, home, is_list))
 }
 
-pub(super) fn tell_orphans(path: &str, orphans: &[&str], home: &str, found: &mut Found<'_>) {
+pub(super) fn tell_orphans(
+    path: &str,
+    (orphans, home, is_list): (&[&str], &str, bool),
+    found: &mut Found<'_>,
+) {
     let keys = orphans.iter().map(|it| below(path, it));
     let mut keys: Vec<String> = keys.collect();
     let repairs = keys.iter().cloned().map(|key| Repair::Remove { key });
     found.repairs.extend(repairs);
     keys.sort_by_key(|it| found.written(it, Part::Name).map(|it| it.start));
     let names: Vec<_> = orphans.iter().map(|it| format!("`{it}`")).collect();
-    let cause = format!("{} are keys of [{home}]", names.join(", "));
+    let heading = match is_list {
+        true => format!("[[{home}]]"),
+        false => format!("[{home}]"),
+    };
+    let cause = format!("{} are keys of {heading}", names.join(", "));
     // Of a section of this one the name is known.
     let help = match !path.is_empty() && home.starts_with(&format!("{path}.")) {
-        true => format!("write the line [{home}] above them, or remove them"),
+        true => format!("write the line {heading} above them, or remove them"),
         false => "write the line with the name of their section above them, or remove them".into(),
     };
     let key = keys.into_iter().next().unwrap_or_default();

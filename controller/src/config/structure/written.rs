@@ -13,7 +13,9 @@ pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Valu
             number.parse().ok().map(Value::Float)
         }
         ("integer", Value::String(text)) => {
-            number_in(text)?.trim().parse().ok().map(Value::Integer)
+            let other = in_other_unit(text, key).map(without_decimals);
+            let number = other.as_deref().or_else(|| number_in(text))?.trim();
+            number.parse().ok().map(Value::Integer)
         }
         ("integer", Value::Float(it)) if it.fract() == 0.0 => Some(Value::Integer(*it as i64)),
         ("boolean", Value::String(text)) => truth(text).map(Value::Boolean),
@@ -66,7 +68,13 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
     match (expected, value) {
         ("number" | "integer", Value::String(text)) => {
             match (in_other_unit(text, key), number_in(text)) {
-                (Some(number), _) => format!("write {number}, which is {text} in the key's unit"),
+                (Some(number), _) => {
+                    let number = match expected {
+                        "integer" => without_decimals(number),
+                        _ => number,
+                    };
+                    format!("write {number}, which is {text} in the key's unit")
+                }
                 (None, Some(number)) if number == text => {
                     format!("write it without quotes: {number}")
                 }
@@ -87,8 +95,12 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
             1 => "write true".into(),
             _ => "give true or false".into(),
         },
-        ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
+        // A serial number may have digits alone; what is called by a name has none.
+        ("string", Value::Integer(_)) if is_of_digits(key) => {
             format!("write it in quotes: \"{written}\"")
+        }
+        ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
+            "give text, in quotes".into()
         }
         ("integer", Value::Float(it)) if it.fract() == 0.0 => format!("write {it:.0}"),
         ("integer", Value::Float(_)) if parts_thousands(written) => {
@@ -114,6 +126,20 @@ fn in_other_unit(text: &str, key: &str) -> Option<String> {
     let (number, unit) = split_unit(text.trim())?;
     let other = unit::converted(number, unit?, key)?;
     (other.parse() != number.parse::<f64>()).then_some(other)
+}
+
+/// Whether the text of a key can be digits and nothing else.
+fn is_of_digits(key: &str) -> bool {
+    ["serial", "name", "plate", "number", "version", "object"]
+        .iter()
+        .any(|it| key.contains(it))
+}
+
+/// `10` of `10.0`.
+fn without_decimals(number: String) -> String {
+    number
+        .strip_suffix(".0")
+        .map_or(number.clone(), str::to_owned)
 }
 
 fn parts_thousands(written: &str) -> bool {

@@ -2,7 +2,7 @@
 
 use toml::de::DeTable;
 
-use super::{Recovered, is_header, name_of};
+use super::{Recovered, TOLD_MAX, is_header, name_of};
 use crate::config::diagnostic::{Diagnostic, shown};
 use crate::config::lines::below;
 
@@ -41,6 +41,11 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
         });
         let is_section = place.is_section();
         leave_out(lines, number, is_section || is_again);
+        // A file with more of them was pasted together: what follows would take long, and say nothing new.
+        if found.findings.len() > TOLD_MAX {
+            lines[number..].iter_mut().for_each(String::clear);
+            found.has_lost_heading = true;
+        }
     }
 }
 

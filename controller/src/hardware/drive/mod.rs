@@ -159,6 +159,13 @@ pub struct CyclicConfig {
     pub correction_rate_um_per_s: f64,
 }
 
+impl MotionConfig {
+    /// Whether the soft limits leave any travel: where they are swapped, that is told and nothing else by them.
+    pub(crate) fn has_travel(&self) -> bool {
+        self.soft_min_mm < self.soft_max_mm
+    }
+}
+
 /// The share of a drive's speed that is left to catch up what a SYNC that came early left short.
 const CATCHING_UP: f64 = 0.02;
 /// A correction never takes more than this share.

@@ -1,0 +1,264 @@
+//! Sections under a name that no section has, by their keys: parts that are swapped, joined, or called by another word.
+
+use serde_json::Value as Schema;
+use toml::{Table, Value};
+
+use super::judge::Finding;
+use super::place::Part;
+use super::repair::join;
+use super::structure::Findings;
+use super::wanted::{Wanted, is_list, section_meant};
+
+/// More parts than this no section's name has.
+const PARTS_MAX: usize = 4;
+
+/// The document with each of them in its place, and what is told of them.
+pub(super) fn relocated(mut document: Table, schema: &Schema) -> (Table, Findings) {
+    let mut sections = Vec::new();
+    walk(&document, &mut Vec::new(), &mut sections);
+    let mut findings = Findings::new();
+    for it in sections {
+        let Some(meant) = it.meant(&document, schema) else {
+            continue;
+        };
+        let Some(value) = taken(&mut document, &it.parts) else {
+            continue;
+        };
+        let nested = meant.iter().rev().fold(value, |inner, part| {
+            Value::Table([(part.clone(), inner)].into_iter().collect())
+        });
+        if let Value::Table(nested) = nested {
+            join(&mut document, nested);
+        }
+        let path = meant.join(".");
+        let heading = match is_list(schema, &path) {
+            true => format!("[[{path}]]"),
+            false => format!("[{path}]"),
+        };
+        let finding = Finding {
+            key: it.parts.join("."),
+            cause: "no section has this name".to_owned(),
+            help: format!("write `{heading}`"),
+        };
+        findings.push((finding, Part::Name));
+    }
+    (document, findings)
+}
+
+/// The parts of a section's name.
+type Name = Vec<String>;
+
+/// The names that a section may have been meant to have.
+type Way = fn(&Named, &Schema) -> Vec<Name>;
+
+/// A section with keys of its own.
+struct Named {
+    parts: Vec<String>,
+    keys: Vec<String>,
+}
+
+/// Every section of `table` that has keys which are no sections, the innermost first.
+fn walk(table: &Table, above: &mut Vec<String>, found: &mut Vec<Named>) {
+    for (name, value) in table {
+        let first = match value {
+            Value::Table(own) => own,
+            Value::Array(items) => match items.first() {
+                Some(Value::Table(own)) => own,
+                _ => continue,
+            },
+            _ => continue,
+        };
+        above.push(name.clone());
+        walk(first, above, found);
+        let plain = first.iter().filter(|(_, it)| !is_section(it));
+        let keys: Vec<String> = plain.map(|(key, _)| key.clone()).collect();
+        if !keys.is_empty() && above.len() <= PARTS_MAX {
+            let parts = above.clone();
+            found.push(Named { parts, keys });
+        }
+        above.pop();
+    }
+}
+
+fn is_section(value: &Value) -> bool {
+    let is_list = |it: &Vec<Value>| !it.is_empty() && it.iter().all(Value::is_table);
+    value.is_table() || value.as_array().is_some_and(is_list)
+}
+
+impl Named {
+    /// The only place that has all its keys and a name that is made of the same parts, or of all but one of them.
+    fn meant(&self, document: &Table, schema: &Schema) -> Option<Name> {
+        if self.is_at_home(schema) {
+            return None;
+        }
+        let is_mistyped = self.is_mistyped(schema);
+        let ways: [Way; 3] = [Self::swapped, Self::parted, Self::renamed];
+        for (nth, way) in ways.into_iter().enumerate() {
+            // Swapped parts may be like other words; what is like the right ones is told where each is judged.
+            // By one key alone nobody is known, and a key with a point in it looks like a section with one.
+            if nth > 0 && (is_mistyped || self.keys.len() < 2) {
+                return None;
+            }
+            let mut found = way(self, schema);
+            found.retain(|it| *it != self.parts && self.fits(it, document, schema));
+            found.sort();
+            found.dedup();
+            let has_section = |it: &Name| at(document, &it[..it.len() - 1]).is_some();
+            if found.iter().any(|it| it.len() > 1 && has_section(it)) {
+                found.retain(has_section);
+            }
+            if let [one] = &mut found[..] {
+                return Some(core::mem::take(one));
+            }
+        }
+        None
+    }
+
+    /// Whether any of its keys is known where it stands.
+    fn is_at_home(&self, schema: &Schema) -> bool {
+        let wanted = Wanted::at(schema, &self.parts.join("."));
+        self.keys.iter().any(|it| wanted.has(it))
+    }
+
+    /// Whether its name is like another one: that is told where each part is judged.
+    fn is_mistyped(&self, schema: &Schema) -> bool {
+        let parts: Vec<&str> = self.parts.iter().map(String::as_str).collect();
+        let meant = section_meant(schema, &parts);
+        meant.is_some_and(|it| {
+            let wanted = Wanted::at(schema, &it);
+            it != self.parts.join(".") && self.keys.iter().any(|key| wanted.has(key))
+        })
+    }
+
+    /// Whether all its keys are known there, and none of them is there already.
+    fn fits(&self, parts: &[String], document: &Table, schema: &Schema) -> bool {
+        let wanted = Wanted::at(schema, &parts.join("."));
+        let there = at(document, parts);
+        let is_free = |key: &String| match there {
+            Some(Value::Table(own)) => !own.contains_key(key),
+            other => other.is_none(),
+        };
+        self.keys.iter().all(|it| wanted.has(it) && is_free(it))
+    }
+
+    /// The same parts in another order.
+    fn swapped(&self, _: &Schema) -> Vec<Name> {
+        orders(&self.parts)
+    }
+
+    /// `axis-x-identity`, `axisx`: parts that nothing, or something else than a point, parts.
+    fn parted(&self, schema: &Schema) -> Vec<Name> {
+        let whole = self.parts.join(".");
+        let known = schema["properties"].as_object().into_iter().flatten();
+        let rests =
+            known.filter_map(|(group, _)| Some((group, whole.strip_prefix(group.as_str())?)));
+        let split = |rest: &str, at: usize| {
+            let (before, behind) = rest.split_at(at);
+            let is_between = |it: char| "._- /".contains(it);
+            let parts = [
+                before.trim_matches(is_between),
+                behind.trim_matches(is_between),
+            ];
+            let parts = parts.into_iter().filter(|it| !it.is_empty());
+            // A point within a word is one that slipped.
+            let whole = parts.map(|it| it.split('.').collect::<String>());
+            whole.collect::<Vec<_>>()
+        };
+        let each = rests.flat_map(|(group, rest)| {
+            let places = rest.char_indices().map(|(at, _)| at);
+            let own = Wanted::at(schema, group);
+            let is_word = move |it: &Name| match it.first() {
+                Some(first) => own.has(first) || !rest[1..].contains('.'),
+                None => false,
+            };
+            let ways = places.map(move |at| split(rest, at)).filter(is_word);
+            ways.map(move |it| [vec![group.clone()], it].concat())
+        });
+        each.filter(|it| it.len() > 1).collect()
+    }
+
+    /// Another word for one of the parts.
+    fn renamed(&self, schema: &Schema) -> Vec<Name> {
+        let others = (0..self.parts.len()).flat_map(|at| {
+            let wanted = Wanted::at(schema, &self.parts[..at].join("."));
+            let words = wanted.keys().into_iter().map(str::to_owned);
+            let words: Vec<String> = words.collect();
+            words.into_iter().map(move |word| {
+                let mut parts = self.parts.clone();
+                parts[at] = word;
+                parts
+            })
+        });
+        others.collect()
+    }
+}
+
+fn orders(parts: &[String]) -> Vec<Name> {
+    if parts.len() < 2 {
+        return vec![parts.to_vec()];
+    }
+    let each = (0..parts.len()).flat_map(|at| {
+        let mut rest = parts.to_vec();
+        let first = rest.remove(at);
+        let inner = orders(&rest).into_iter();
+        inner
+            .map(move |it| [vec![first.clone()], it].concat())
+            .collect::<Vec<_>>()
+    });
+    each.collect()
+}
+
+fn at<'a>(document: &'a Table, parts: &[String]) -> Option<&'a Value> {
+    let (first, rest) = parts.split_first()?;
+    rest.iter()
+        .try_fold(document.get(first)?, |value, part| value.get(part))
+}
+
+/// The section, which is no longer in the document, nor are those around it that are empty without it.
+fn taken(document: &mut Table, parts: &[String]) -> Option<Value> {
+    let (first, rest) = parts.split_first()?;
+    if rest.is_empty() {
+        return document.remove(first);
+    }
+    let outer = document.get_mut(first)?.as_table_mut()?;
+    let found = taken(outer, rest);
+    if outer.is_empty() {
+        document.remove(first);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Edit;
+    use crate::config::{ConfigError, parse};
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+
+    #[test]
+    fn a_section_under_another_name_is_known_by_its_keys() {
+        for (right, wrong) in [
+            ("[analog.hall]", "[hall.analog]"),
+            ("[can.can0]", "[can0.can]"),
+            ("[axis.x.identity]", "[axis-x-identity]"),
+            ("[axis.x.identity]", "[axis.identity.x]"),
+            ("[axis.x.identity]", "[identity.axis.x]"),
+            ("[axis.x.identity]", "[axis.x-identity]"),
+            ("[axis.x]", "[axisx]"),
+            ("[axis.x]", "[achse.x]"),
+            ("[analog.hall.identity]", "[adc.hall.identity]"),
+            ("[axis.x.compensation]", "[axis.x.correction]"),
+        ] {
+            let text = LINEAR.edit(&format!("{right}\n"), &format!("{wrong}\n"));
+            let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+                panic!("{wrong} is no section")
+            };
+            let told: Vec<_> = findings.iter().map(ToString::to_string).collect();
+            assert_eq!(findings.len(), 1, "{told:#?}");
+            assert!(
+                findings[0].help.contains(&format!("`{right}`")),
+                "{told:#?}"
+            );
+        }
+    }
+}
