@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 use super::certificates;
+use super::consequences;
 use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
@@ -155,7 +156,7 @@ fn read_by<C: DeserializeOwned>(
     text: &str,
     file: &str,
     schema: &serde_json::Value,
-    judge: impl FnMut(&C) -> Vec<Finding>,
+    mut judge: impl FnMut(&C) -> Vec<Finding>,
 ) -> Result<C, ConfigError> {
     if let Some(error) = whole::told(text, file) {
         return Err(error);
@@ -179,10 +180,11 @@ fn read_by<C: DeserializeOwned>(
         a_section: recovered.has_lost_heading,
     };
     let found = structure::judge((&document, &recovered.text), schema, unread);
-    let (mut findings, repairs) = (found.findings, found.repairs);
+    let (mut findings, repairs, doubts) = (found.findings, found.repairs, found.doubts);
     findings.extend(relocated);
     findings.extend(regrouped);
-    let config = Value::Table(repaired(document, &repairs)).try_into::<C>();
+    let document = repaired(document, &repairs);
+    let config = Value::Table(document.clone()).try_into::<C>();
     let is_sound = findings.is_empty() && recovered.findings.is_empty();
     let config = match config {
         Ok(config) => Some(config),
@@ -196,7 +198,16 @@ fn read_by<C: DeserializeOwned>(
         .collect();
     // By a value that cannot be read nothing else can be judged, not even by what it is when it is not there.
     let is_whole = recovered.unread.is_empty() && !recovered.has_lost_heading;
-    for finding in config.iter().filter(|_| is_whole).flat_map(judge) {
+    let judged: Vec<Finding> = config
+        .iter()
+        .filter(|_| is_whole)
+        .flat_map(&mut judge)
+        .collect();
+    let judged = consequences::left_out(judged, &document, &doubts, |it| {
+        let config = Value::Table(it.clone()).try_into::<C>();
+        Some(judge(&config.ok()?))
+    });
+    for finding in judged {
         // What is impossible by itself is told once, and not again of the section around it.
         if !told.iter().any(|key| is_within(key, &finding.key)) {
             findings.push((finding, Part::Value));

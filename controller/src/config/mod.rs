@@ -5,6 +5,7 @@
 
 mod axis;
 mod certificates;
+mod consequences;
 pub(crate) mod dependence;
 #[cfg(any(feature = "program", test))]
 mod described;

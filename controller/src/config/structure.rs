@@ -14,6 +14,7 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 use units::Short;
 
+use super::consequences::Doubt;
 use super::diagnostic::shown;
 use super::judge::Finding;
 use super::lines::below;
@@ -47,6 +48,8 @@ pub(super) struct Found<'a> {
     pub(super) findings: Findings,
     /// What makes a file that can be read all the same of it, as far as that can be told.
     pub(super) repairs: Vec<Repair>,
+    /// Values outside of what their keys can have.
+    pub(super) doubts: Vec<Doubt>,
     unread: Unread<'a>,
     schema: &'a Schema,
     document: &'a Table,
@@ -61,6 +64,17 @@ pub(super) struct Found<'a> {
 }
 
 impl Found<'_> {
+    /// Notes a number outside of its bounds, with some within.
+    fn doubt(&mut self, key: &str, (low, high): (Option<f64>, Option<f64>)) {
+        let middle = low.zip(high).map(|(low, high)| match low > 0.0 {
+            true => (low * high).sqrt(),
+            false => f64::midpoint(low, high),
+        });
+        let within = [low, middle, high].into_iter().flatten().collect();
+        let key = key.to_owned();
+        self.doubts.push(Doubt { key, within });
+    }
+
     fn replace(&mut self, key: &str, value: Option<Value>) {
         let key = key.to_owned();
         self.repairs
@@ -102,6 +116,7 @@ pub(super) fn judge<'a>(
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
+        doubts: Vec::new(),
         unread,
         schema,
         document,
@@ -121,6 +136,7 @@ pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
+        doubts: Vec::new(),
         unread: Unread::default(),
         schema,
         document: &document,
@@ -358,10 +374,12 @@ fn number(path: &str, seen: f64, schema: &Schema, found: &mut Found<'_>) {
             (None, Some(high)) => format!("give {} or less", whole(high)),
             (None, None) => "give a number".into(),
         };
+        found.doubt(path, (low, high));
         say_size(found, path, seen, help);
         return;
     }
     if let Some(limit) = schema["x-above"].as_f64().filter(|it| seen <= *it) {
+        found.doubt(path, (Some(limit + 1.0), None));
         let help = format!("give more than {}", Short(limit));
         say_size(found, path, seen, help);
     }

@@ -1,0 +1,179 @@
+//! What is wrong only because something else is: told by that alone. A value that is wrong by itself is tried as others
+//! that it could have; what is then no longer found was found because of it.
+
+use std::collections::BTreeSet;
+
+use toml::{Table, Value};
+
+use super::judge::Finding;
+
+/// A file with more findings than this is judged as it is: each is tried by itself.
+const FINDINGS_MAX: usize = 24;
+/// So many other values of one key are tried at most.
+const TRIALS_MAX: usize = 48;
+
+/// A value outside of what its key can have, with values within.
+#[derive(Clone, Debug)]
+pub(super) struct Doubt {
+    pub(super) key: String,
+    pub(super) within: Vec<f64>,
+}
+
+/// `findings` without those that are consequences of `doubts`, or of another one; `found_in` judges a document, and
+/// gives nothing where it cannot be read.
+pub(super) fn left_out(
+    mut findings: Vec<Finding>,
+    document: &Table,
+    doubts: &[Doubt],
+    mut found_in: impl FnMut(&Table) -> Option<Vec<Finding>>,
+) -> Vec<Finding> {
+    let mut keys_with = |key: &str, value: Value| {
+        let mut other = document.clone();
+        let own = value_at(&mut other, key)?;
+        *own = match (&own, value) {
+            (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
+            (_, value) => value,
+        };
+        let found = found_in(&other)?;
+        Some(found.into_iter().map(|it| it.key).collect::<BTreeSet<_>>())
+    };
+    for doubt in doubts {
+        for value in &doubt.within {
+            let Some(found) = keys_with(&doubt.key, Value::Float(*value)) else {
+                continue;
+            };
+            findings.retain(|it| found.contains(&it.key));
+        }
+    }
+    if !(2..=FINDINGS_MAX).contains(&findings.len()) {
+        return findings;
+    }
+    let all: BTreeSet<String> = findings.iter().map(|it| it.key.clone()).collect();
+    // Of two that contradict each other either can be the wrong one: both are told.
+    let mut roots: BTreeSet<String> = BTreeSet::new();
+    let mut most = BTreeSet::new();
+    for root in &all {
+        for value in trials(document, root) {
+            let Some(found) = keys_with(root, value) else {
+                continue;
+            };
+            // Another value that is wrong in another way says nothing.
+            if found.contains(root) || !found.is_subset(&all) {
+                continue;
+            }
+            let gone: BTreeSet<String> = all.difference(&found).cloned().collect();
+            if gone.len() > most.len().max(1) {
+                roots.clear();
+                most.clone_from(&gone);
+            }
+            if gone == most {
+                roots.insert(root.clone());
+            }
+        }
+    }
+    findings.retain(|it| roots.contains(&it.key) || !most.contains(&it.key));
+    findings
+}
+
+/// Other values that the key could have.
+fn trials(document: &Table, key: &str) -> Vec<Value> {
+    let mut document = document.clone();
+    let names: Vec<String> = document
+        .values()
+        .filter_map(Value::as_table)
+        .flat_map(|it| it.keys().cloned())
+        .collect();
+    let Some(own) = value_at(&mut document, key) else {
+        return Vec::new();
+    };
+    let mut found = match own {
+        Value::Array(items) => {
+            let each = items.iter().enumerate();
+            let other = each.flat_map(|(at, it)| {
+                let others = others(it, &names).into_iter();
+                let with = others.map(move |other| (at, other));
+                with.collect::<Vec<_>>()
+            });
+            let whole = other.map(|(at, other)| {
+                let mut items = items.clone();
+                items[at] = other;
+                Value::Array(items)
+            });
+            whole.collect()
+        }
+        own => others(own, &names),
+    };
+    found.truncate(TRIALS_MAX);
+    found
+}
+
+/// What a slip of the hand makes of a value, backwards.
+fn others(value: &Value, names: &[String]) -> Vec<Value> {
+    const FACTORS: [f64; 9] = [-1.0, 0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3, 0.5, 2.0];
+    match value {
+        Value::Float(it) => FACTORS.iter().map(|by| Value::Float(it * by)).collect(),
+        Value::Integer(it) => {
+            let by_factor = FACTORS.iter().map(|by| (*it as f64 * by) as i64);
+            let near = (0..8).chain([it.saturating_add(1), it.saturating_sub(1)]);
+            near.chain(by_factor).map(Value::Integer).collect()
+        }
+        Value::String(_) => names.iter().cloned().map(Value::String).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The value of a key as findings name it: `actuator[0]` is `actuator.0`.
+fn value_at<'a>(document: &'a mut Table, key: &str) -> Option<&'a mut Value> {
+    let mut parts = key.split(['.', '[', ']']).filter(|it| !it.is_empty());
+    let mut value = document.get_mut(parts.next()?)?;
+    for part in parts {
+        value = match value {
+            Value::Table(inner) => inner.get_mut(part)?,
+            Value::Array(items) => items.get_mut(part.parse::<usize>().ok()?)?,
+            _ => return None,
+        };
+    }
+    Some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Edit;
+    use crate::config::{ConfigError, parse};
+
+    const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+    const VOLUMETRIC: &str = include_str!("../../../configs/machines/volumetric.toml");
+
+    #[track_caller]
+    fn check(text: &str, keys: &[&str]) {
+        let Err(ConfigError::Invalid { findings }) = parse(text, "m.toml") else {
+            panic!("it is wrong")
+        };
+        let mut told: Vec<_> = findings.iter().map(|it| it.key.as_str()).collect();
+        told.dedup();
+        assert_eq!(told, keys, "{findings:#?}");
+    }
+
+    #[test]
+    fn what_is_wrong_because_of_another_value_is_not_told() {
+        let text = LINEAR.edit("rail_high_v = 4.9", "rail_high_v = -7.35");
+        check(&text, &["axis.x.zero.rail_high_v"]);
+        let text = LINEAR.edit("delta1_mv = 20.0", "delta1_mv = 20000.0");
+        check(&text, &["axis.x.zero.delta1_mv"]);
+        let text = LINEAR.edit("master_heartbeat_ms = 50", "master_heartbeat_ms = 15001");
+        check(&text, &["can.can0.master_heartbeat_ms"]);
+        let text = VOLUMETRIC.edit(
+            "axes = [\"x\", \"y\", \"z\"]",
+            "axes = [\"y\", \"y\", \"z\"]",
+        );
+        check(&text, &["volumetric.axes"]);
+    }
+
+    #[test]
+    fn two_that_have_nothing_to_do_with_each_other_are_both_told() {
+        let text = LINEAR
+            .edit("rail_high_v = 4.9", "rail_high_v = -7.35")
+            .edit_first("node_id = 2", "node_id = 1");
+        check(&text, &["analog.hall.node_id", "axis.x.zero.rail_high_v"]);
+    }
+}
