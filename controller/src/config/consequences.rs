@@ -10,7 +10,7 @@ use super::judge::Finding;
 /// A file with more findings than this is judged as it is: each is tried by itself.
 const FINDINGS_MAX: usize = 24;
 /// So many other values of one key are tried at most.
-const TRIALS_MAX: usize = 48;
+const TRIALS_MAX: usize = 200;
 
 /// A value outside of what its key can have, with values within.
 #[derive(Clone, Debug)]
@@ -109,7 +109,10 @@ fn trials(document: &Table, key: &str) -> Vec<Value> {
 
 /// What a slip of the hand makes of a value, backwards.
 fn others(value: &Value, names: &[String]) -> Vec<Value> {
-    const FACTORS: [f64; 9] = [-1.0, 0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3, 0.5, 2.0];
+    // Beyond what it was swapped with, too.
+    const FACTORS: [f64; 12] = [
+        -1.0, -1.01, -10.0, -100.0, 0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3, 0.5, 2.0,
+    ];
     match value {
         Value::Float(it) => FACTORS.iter().map(|by| Value::Float(it * by)).collect(),
         Value::Integer(it) => {

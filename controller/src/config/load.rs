@@ -180,6 +180,7 @@ fn read_by<C: DeserializeOwned>(
         a_section: recovered.has_lost_heading,
     };
     let found = structure::judge((&document, &recovered.text), schema, unread);
+    let has_nameless = found.has_nameless;
     let (mut findings, repairs, doubts) = (found.findings, found.repairs, found.doubts);
     findings.extend(relocated);
     findings.extend(regrouped);
@@ -197,7 +198,7 @@ fn read_by<C: DeserializeOwned>(
         .chain(repairs.iter().flat_map(Repair::doubted))
         .collect();
     // By a value that cannot be read nothing else can be judged, not even by what it is when it is not there.
-    let is_whole = recovered.unread.is_empty() && !recovered.has_lost_heading;
+    let is_whole = recovered.unread.is_empty() && !recovered.has_lost_heading && !has_nameless;
     let judged: Vec<Finding> = config
         .iter()
         .filter(|_| is_whole)
@@ -225,7 +226,9 @@ fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> 
     let findings = findings.filter(|(it, _)| !recovered.contested.contains(&it.key));
     let mut found = placed(&recovered.text, file, findings);
     let is_mistaken = |it: &&Diagnostic| {
-        it.cause.starts_with("expected") && recovered.taken_for_text.contains(&it.line)
+        let is_of_value =
+            it.cause.starts_with("expected") || it.cause.ends_with("is not known here");
+        is_of_value && recovered.taken_for_text.contains(&it.line)
     };
     // A word where a number belongs is told as that.
     let mistaken: Vec<_> = found.iter().filter(is_mistaken).map(|it| it.line).collect();

@@ -92,7 +92,7 @@ impl Named {
             return None;
         }
         let is_mistyped = self.is_mistyped(schema);
-        let ways: [Way; 3] = [Self::swapped, Self::parted, Self::renamed];
+        let ways: [Way; 4] = [Self::swapped, Self::parted, Self::shortened, Self::renamed];
         for (nth, way) in ways.into_iter().enumerate() {
             // Swapped parts may be like other words; what is like the right ones is told where each is judged.
             // By one key alone nobody is known, and a key with a point in it looks like a section with one.
@@ -175,6 +175,16 @@ impl Named {
             ways.map(move |it| [vec![group.clone()], it].concat())
         });
         each.filter(|it| it.len() > 1).collect()
+    }
+
+    /// One part too many.
+    fn shortened(&self, _: &Schema) -> Vec<Name> {
+        let each = (0..self.parts.len()).map(|at| {
+            let mut parts = self.parts.clone();
+            parts.remove(at);
+            parts
+        });
+        each.filter(|it| !it.is_empty()).collect()
     }
 
     /// Another word for one of the parts.

@@ -61,6 +61,7 @@ fn apply(table: &mut Table, key: &str, repair: &Repair) {
             (Some(Value::Table(own)), Some(Value::Table(other))) => {
                 join(other, own);
             }
+            (Some(Value::Array(own)), Some(Value::Array(other))) => other.extend(own),
             (Some(value), None) => {
                 table.insert(to.clone(), value);
             }

@@ -29,6 +29,8 @@ pub(super) struct Slip {
     pub(super) is_comment: bool,
     /// Whether it begins a section of which the name cannot be read.
     pub(super) is_lost_heading: bool,
+    /// A second key of the line, which is not read.
+    pub(super) lost: Option<String>,
     /// The key that it is about, where the line does not tell it.
     pub(super) key: Option<String>,
 }
@@ -45,6 +47,7 @@ impl Slip {
             is_ambiguous: false,
             is_comment: false,
             is_lost_heading: false,
+            lost: None,
             key: None,
         }
     }
@@ -262,7 +265,10 @@ fn two_keys(parts: &Parts<'_>) -> Option<Slip> {
     is_told.then(|| {
         let cause = format!("the key `{}` begins in the middle of a line", shown(second));
         let help = format!("begin a new line before `{}`", shown(second));
-        Slip::new(parts.value_at + begin, cause, help, Some(meant))
+        Slip {
+            lost: Some(second.to_owned()),
+            ..Slip::new(parts.value_at + begin, cause, help, Some(meant))
+        }
     })
 }
 

@@ -1,5 +1,6 @@
 //! Whether a file has the keys, types and ranges that its schema says.
 
+mod called;
 mod moved;
 mod named;
 pub(in crate::config) mod places;
@@ -56,7 +57,7 @@ pub(super) struct Found<'a> {
     /// The file as it stands.
     text: &'a str,
     /// Whether keys stand in a section that lacks its name: what is missing may be theirs.
-    has_nameless: bool,
+    pub(super) has_nameless: bool,
     /// Keys that are not known where they stand, and keys that are missing, each with its finding.
     moved: Moved,
     /// The sections that are being judged, from the outermost on, with the keys that they could still have.
@@ -430,7 +431,8 @@ fn name(path: &str, value: &Value, names: &[&str], found: &mut Found<'_>) {
     if names.contains(&text.as_str()) {
         return;
     }
-    let meant = word_meant(text, names);
+    // A device of another section was no slip of the hand.
+    let meant = word_meant(text, names).filter(|_| !is_device(found.schema, text));
     found.replace(path, meant.map(|it| Value::String(it.to_owned())));
     let help = match meant {
         Some(word) if names.len() > 1 => format!("did you mean \"{word}\"? It can be {known}"),
@@ -443,6 +445,18 @@ fn name(path: &str, value: &Value, names: &[&str], found: &mut Found<'_>) {
         format!("`{}` is not known here", shown(text)),
         help,
     );
+}
+
+/// Whether the word names a device, of whatever section.
+fn is_device(schema: &Schema, word: &str) -> bool {
+    match schema {
+        Schema::Object(inner) => {
+            let own = inner.get(DEVICE).and_then(|it| it["const"].as_str());
+            own == Some(word) || inner.values().any(|it| is_device(it, word))
+        }
+        Schema::Array(items) => items.iter().any(|it| is_device(it, word)),
+        _ => false,
+    }
 }
 
 #[cfg(test)]

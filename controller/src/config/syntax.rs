@@ -58,6 +58,8 @@ impl Recovered {
         if (slip.meant.is_none() || slip.key.is_some()) && !key.is_empty() {
             self.unread.push(key.clone());
         }
+        self.unread
+            .extend(slip.lost.iter().map(|it| below(&section.path, it)));
         self.has_lost_heading |= slip.is_lost_heading;
         if slip.is_lost_heading && slip.meant.is_some() {
             self.cut_short.push(section.path.clone());

@@ -44,6 +44,21 @@ pub(super) fn is_known(unit: &str) -> bool {
     size(unit).is_some()
 }
 
+/// `5k` is five thousand, where the key has a unit of its own.
+pub(super) fn magnified(number: &str, unit: &str, key: &str) -> Option<String> {
+    unit_of(key)?;
+    let factor = match unit {
+        "k" | "K" => 1e3,
+        "M" => 1e6,
+        _ => return None,
+    };
+    let value = number.parse::<f64>().ok()? * factor;
+    Some(match number.contains('.') || value.fract() != 0.0 {
+        true => format!("{value:?}"),
+        false => format!("{value}"),
+    })
+}
+
 /// Whether nobody knows how much of the key's own unit it is: another quantity, or a unit that is not known.
 pub(super) fn is_another(unit: &str, key: &str) -> bool {
     // A letter by itself was a slip of the hand.

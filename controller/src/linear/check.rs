@@ -89,6 +89,9 @@ fn check_cycle(findings: &mut Vec<Finding>, config: &MachineConfig, name: &str, 
 
 /// From one side at least there must be room for it everywhere.
 fn check_approach(judge: &mut Judge<'_>, axis: &AxisConfig, limits: &CompensationConfig) {
+    if !axis.motion.has_travel() {
+        return;
+    }
     let half = (axis.motion.soft_max_mm - axis.motion.soft_min_mm) / 2.0;
     if let Some(length) = limits.approach_mm.filter(|it| *it > half) {
         judge.say(
@@ -163,7 +166,8 @@ fn check_zero_place(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig)
             "give the switch's position relative to the zero, below soft_min_mm: usually negative",
         );
     }
-    if !(axis.motion.soft_min_mm..=axis.motion.soft_max_mm).contains(&0.0) {
+    let has_zero = (axis.motion.soft_min_mm..=axis.motion.soft_max_mm).contains(&0.0);
+    if axis.motion.has_travel() && !has_zero {
         judge.say(
             "",
             format!(

@@ -122,6 +122,21 @@ fn check_references(
     }
 }
 
+fn names_an_axis_twice(judge: &mut Judge<'_>, platform: &PlatformConfig) -> bool {
+    let axes = || platform.actuator.iter().map(|it| &it.axis);
+    let mut each = axes().enumerate();
+    let twice = each.find(|(at, axis)| axes().take(*at).any(|it| it == *axis));
+    if let Some((at, axis)) = twice {
+        let cause = format!("another screw has the axis `{axis}` already");
+        judge.say(
+            &format!("actuator[{at}].axis"),
+            cause,
+            "give each screw its own",
+        );
+    }
+    twice.is_some()
+}
+
 /// Targets go by name: whoever asks for a part of the pose would be given the axis that is called like it.
 fn check_names(findings: &mut Vec<Finding>, config: &MachineConfig) {
     let axes = config.axis.keys().map(|it| ("axis", it));
@@ -209,7 +224,9 @@ fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &P
         Ok(held) => held,
         Err(error) => {
             let help = "check point_mm and direction of each [[platform.actuator]]";
-            judge.say("actuator", error.to_string(), help);
+            if !names_an_axis_twice(judge, platform) {
+                judge.say("actuator", error.to_string(), help);
+            }
             return;
         }
     };

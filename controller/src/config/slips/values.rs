@@ -2,7 +2,7 @@
 
 use super::{Parts, Slip};
 use crate::config::diagnostic::shown;
-use crate::config::unit::{converted, is_another, is_unit, split_unit};
+use crate::config::unit::{converted, is_another, is_unit, magnified, split_unit};
 
 pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
     let value = parts.value?;
@@ -60,6 +60,10 @@ fn with_a_unit(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         "`{}` is no number: the unit is in the key's name",
         shown(value)
     );
+    if let Some(other) = magnified(number, unit, parts.key) {
+        let help = format!("write {other}");
+        return parts.value_meant(&other, cause, help);
+    }
     match converted(number, unit, parts.key) {
         Some(other) if other.parse() != number.parse::<f64>() => {
             let help = format!("write {other}, which is {number} {unit} in the key's unit");

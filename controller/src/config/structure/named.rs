@@ -4,7 +4,7 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 
 use super::section::Section;
-use super::{Found, any};
+use super::{Found, any, called};
 use crate::config::judge::Finding;
 use crate::config::lines::below;
 use crate::config::meant::word_meant;
@@ -61,7 +61,10 @@ fn nameless(path: &str, whole: &mut Table, own: &Schema, found: &mut Found<'_>) 
         }
         _ => {
             found.has_nameless = true;
-            format!("write [{path}.NAME] above them, with a name of your own")
+            match called::missing(path, found.document) {
+                Some(name) => format!("write [{path}.{name}]"),
+                None => format!("write [{path}.NAME] above them, with a name of your own"),
+            }
         }
     };
     tell(found, path.to_owned(), cause, help);

@@ -4,7 +4,7 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 
 use super::section::Section;
-use super::{Found, any, places};
+use super::{Found, any, called, places};
 use crate::config::judge::Finding;
 use crate::config::lines::below;
 use crate::config::meant::key_meant;
@@ -20,6 +20,12 @@ pub(super) fn merged(seen: &Table, section: &Section<'_>) -> Table {
             true => None,
             false => section.part_meant(key, value),
         };
+        if let (Some(name), Value::Array(own)) = (meant, value)
+            && let Some(Value::Array(other)) = seen.get(name)
+        {
+            let all = other.iter().chain(own).cloned().collect();
+            merged.insert(name.to_owned(), Value::Array(all));
+        }
         if let (Some(name), Value::Table(own)) = (meant, value)
             && let Some(Value::Table(other)) = seen.get(name)
         {
@@ -79,7 +85,10 @@ pub(super) fn unknown<'a>(
         (Some(part), _, _) => (format!("did you mean `{part}`?"), renamed(part), Some(part)),
         (None, Some(home), _) => (home, remove(), None),
         (None, None, Some(key)) => (advice(meant, free), renamed(key), Some(key)),
-        (None, None, None) => (elsewhere(schema, name, free), remove(), None),
+        (None, None, None) => {
+            let help = elsewhere((schema, found.document), (path, name), free);
+            (help, remove(), None)
+        }
     };
     let is_own = meant.is_some_and(|it| section.required.contains(&it));
     tell("there is no such key here".to_owned(), help, repair);
@@ -145,13 +154,16 @@ pub(super) fn tell_orphans(
     found.repairs.extend(repairs);
     keys.sort_by_key(|it| found.written(it, Part::Name).map(|it| it.start));
     let names: Vec<_> = orphans.iter().map(|it| format!("`{it}`")).collect();
+    found.has_nameless = true;
+    let home = &called::with_a_name(home, path, found.document);
     let heading = match is_list {
         true => format!("[[{home}]]"),
         false => format!("[{home}]"),
     };
     let cause = format!("{} are keys of {heading}", names.join(", "));
     // Of a section of this one the name is known.
-    let help = match !path.is_empty() && home.starts_with(&format!("{path}.")) {
+    let is_known = !home.contains("NAME") && !called::is_there(home, found.document);
+    let help = match is_known || !path.is_empty() && home.starts_with(&format!("{path}.")) {
         true => format!("write the line {heading} above them, or remove them"),
         false => "write the line with the name of their section above them, or remove them".into(),
     };
@@ -162,8 +174,26 @@ pub(super) fn tell_orphans(
 }
 
 /// What to say of a key that is like none of those that are `free`.
-fn elsewhere(schema: &Schema, key: &str, free: &[&str]) -> String {
+fn elsewhere(
+    (schema, document): (&Schema, &Table),
+    (path, key): (&str, &str),
+    free: &[&str],
+) -> String {
+    let homes = places::with_all(schema, &[key]);
+    if let [home] = &homes[..]
+        && !home.is_empty()
+    {
+        let home = called::with_a_name(home, path, document);
+        return match called::is_there(&home, document) || home.contains("NAME") {
+            true => format!("`{key}` is a key of [{home}]: write it there"),
+            false => format!(
+                "`{key}` is a key of [{home}], which is not there: write that line above it"
+            ),
+        };
+    }
     match places::of(schema, key) {
+        // One that is known elsewhere is moved there, and not only removed.
+        Some(sections) if free.is_empty() => format!("`{key}` is a key of {sections}"),
         Some(sections) => format!("`{key}` is a key of {sections}; {}", advice(None, free)),
         None => advice(None, free),
     }

@@ -1,5 +1,7 @@
 //! Keys and sections that stand in a text a second time, or one as the other.
 
+use std::collections::BTreeMap;
+
 use toml::de::DeTable;
 
 use super::{Recovered, TOLD_MAX, is_header, name_of};
@@ -31,6 +33,9 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
             false => place.told(),
         };
         found.contested.push(place.key());
+        // Which of the two was meant to be the missing one nobody knows.
+        let is_lacking = place.is_section() && place.lacking(name_of(place.line)).is_some();
+        found.has_lost_heading |= is_lacking;
         found.findings.push(Diagnostic {
             file: file.to_owned(),
             line: number + 1,
@@ -173,12 +178,42 @@ impl<'a> Place<'a> {
         let what = if is_section { "the section" } else { "the key" };
         let cause = format!("{what} stands here a second time; line {number} has it first");
         let help = match is_section {
-            true => "leave one of them out",
+            true => match self.lacking(wanted) {
+                Some(other) => format!(
+                    "one of them was meant to be [{other}], which is missing: write that, or leave one out"
+                ),
+                None => "leave one of them out".to_owned(),
+            },
             false => {
                 "leave one of them out, or write the section's name that is missing between them"
+                    .to_owned()
             }
         };
-        Some((cause, help.into()))
+        Some((cause, help))
+    }
+
+    /// `axis.y.zero` where `axis.x.zero` stands twice, and only `y` has none.
+    fn lacking(&self, section: &str) -> Option<String> {
+        let (group, rest) = section.split_once('.')?;
+        let (_, part) = rest.split_once('.')?;
+        let headers = self
+            .lines
+            .iter()
+            .map(|it| it.trim())
+            .filter(|it| is_header(it));
+        let names = headers
+            .map(name_of)
+            .filter_map(|it| it.strip_prefix(group)?.strip_prefix('.'));
+        let mut each: BTreeMap<&str, bool> = BTreeMap::new();
+        for it in names {
+            let (name, own) = it.split_once('.').unwrap_or((it, ""));
+            *each.entry(name).or_default() |= own == part;
+        }
+        let mut lacking = each.into_iter().filter(|it| !it.1).map(|it| it.0);
+        match (lacking.next(), lacking.next()) {
+            (Some(one), None) => Some(format!("{group}.{one}.{part}")),
+            _ => None,
+        }
     }
 
     /// Where a key has the name that a section has here, or the other way round.

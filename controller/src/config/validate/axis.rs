@@ -6,6 +6,8 @@ use units::Short;
 
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
+use crate::hardware::bus::SerialLine;
+use crate::hardware::drive::copley::AMPLIFIER_RATES;
 
 pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
     let motion = &axis.motion;
@@ -106,6 +108,20 @@ fn check_drive_units(judge: &mut Judge<'_>, axis: &AxisConfig) {
     }
 }
 
+/// An amplifier can be brought to these rates only.
+fn check_rate(judge: &mut Judge<'_>, line: Option<&SerialLine>) {
+    if let Some(rate) = line
+        .map(|it| it.baud_bit_per_s)
+        .filter(|it| !AMPLIFIER_RATES.contains(it))
+    {
+        judge.say(
+            "baud_bit_per_s",
+            format!("{rate} bit/s is not a bit rate of an amplifier"),
+            format!("give one of {AMPLIFIER_RATES:?}"),
+        );
+    }
+}
+
 /// Amplifiers share a line by their addresses; nothing else can share it with them.
 pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let mut taken: BTreeMap<(&str, u8), String> = BTreeMap::new();
@@ -116,7 +132,12 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
         };
         let line = axis.port();
         let key = format!("axis.{name}.address");
-        owned.entry(line).or_insert_with(|| key.clone());
+        if owned.insert(line, key.clone()).is_none() {
+            check_rate(
+                &mut Judge::at(format!("serial.{line}"), findings),
+                config.serial.get(line),
+            );
+        }
         if let Some(other) = taken.insert((line, address), key.clone()) {
             findings.push(Finding {
                 key,
@@ -193,7 +214,10 @@ mod tests {
         let (from, key) = ("address = 2", "axis.w.address");
         check(AMPLIFIERS, from, "address = 1", key, again);
         check(AMPLIFIERS, from, "address = 128", key, "128");
-        let (from, key) = ("baud_bit_per_s = 115200        #", "axis.u.line");
+        let (from, key) = (
+            "baud_bit_per_s = 115200        #",
+            "serial.amps.baud_bit_per_s",
+        );
         let to = "baud_bit_per_s = 14400 #";
         check(AMPLIFIERS, from, to, key, "not a bit rate of an amplifier");
         let (from, key) = ("line = \"vision\"", "camera.eye.line");

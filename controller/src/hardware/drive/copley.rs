@@ -16,7 +16,7 @@ use crate::hardware::bus::Wiring;
 use crate::hardware::{CHECKED, millis};
 
 /// The rates that both amplifiers and serial ports have.
-const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
+pub(crate) const AMPLIFIER_RATES: [u32; 5] = [9_600, 19_200, 38_400, 57_600, 115_200];
 
 /// What only an axis on a serial line has.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -130,18 +130,6 @@ impl Family for CopleyAxisConfig {
         }
         let name = &self.line;
         judge.known("line", name, wiring.serial, "serial line");
-        if let Some(line) = wiring.serial.get(name)
-            && !AMPLIFIER_RATES.contains(&line.baud_bit_per_s)
-        {
-            judge.say(
-                "line",
-                format!(
-                    "{} bit/s is not a bit rate of an amplifier",
-                    line.baud_bit_per_s
-                ),
-                format!("give serial.{name}.baud_bit_per_s one of {AMPLIFIER_RATES:?}"),
-            );
-        }
     }
 
     fn driver(&self, task: Task<'_>, wiring: Wiring<'_>, patience: Patience) -> Box<dyn Axis> {
