@@ -7,6 +7,12 @@ use units::Short;
 use super::diagnostic::shown;
 use super::meant::word_meant;
 
+/// A tolerance so many times as large as the errors that are corrected is reached by any machine: its errors are larger
+/// before they are corrected, but hardly by so much.
+pub(crate) const ANY_REACHES: f64 = 10.0;
+/// An axis is measured where it works, which may be a small part of its travel; less than this share is seldom meant.
+pub(crate) const COVERED_SHARE: f64 = 0.1;
+
 /// Something that cannot be, at a dotted key.
 #[derive(Clone, Debug)]
 pub(crate) struct Finding {

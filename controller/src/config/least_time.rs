@@ -6,8 +6,10 @@ use units::{Short, ShortSpan};
 
 use super::judge::Judge;
 
-/// A run that is longer than a shift.
-pub(crate) const RUN_MAX_S: f64 = 8.0 * 3600.0;
+/// An axis is measured over a night; a run that is longer than a day is seldom meant.
+pub(crate) const RUN_MAX_S: f64 = 24.0 * 3600.0;
+/// A table or a volume is measured over a weekend.
+pub(crate) const LONG_RUN_MAX_S: f64 = 3.0 * RUN_MAX_S;
 /// Nobody waits so long beside a move that hangs.
 const HANGS_MAX_S: f64 = 600.0;
 /// What takes time may take so much longer than it must, whatever settles.

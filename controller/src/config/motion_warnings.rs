@@ -10,10 +10,16 @@ use crate::rotary::RotaryConfig;
 
 /// A piezo at a slow speed reaches it in a hundredth of a millisecond, a heavy table in half a minute.
 const RAMP_S: (f64, f64) = (1e-5, 60.0);
+/// A slow scan is reached in no time by what any drive does, in mm/s² or °/s²: that is as sound.
+const USUAL: f64 = 1e5;
 /// A lag of more than this share of the travel is no error any more: the axis stands.
 const LAG_SHARE: f64 = 0.1;
+/// What any drive may lag behind, in millimetres: it is more than that of a piezo's travel.
+const LAG_MM: f64 = 1.0;
 /// An axis that may stand this far off has no place.
 const WINDOW_SHARE: f64 = 0.01;
+/// What any axis may stand beside its target, in millimetres, however short it is.
+const WINDOW_MM: f64 = 0.05;
 const TRAVEL_MM: (f64, f64) = (0.005, 10_000.0);
 const TURN_DEG: f64 = 360.0;
 
@@ -51,10 +57,12 @@ struct Motion {
     acceleration: f64,
     lag: f64,
     window: f64,
+    /// A larger lag is doubted, in the unit of the way.
+    lag_max: f64,
 }
 
 impl Motion {
-    const fn axis(axis: &AxisConfig) -> Self {
+    fn axis(axis: &AxisConfig) -> Self {
         let motion = &axis.motion;
         Self {
             words: &LINEAR,
@@ -63,6 +71,7 @@ impl Motion {
             acceleration: motion.acceleration_mm_per_s2,
             lag: motion.following_error_limit_um,
             window: motion.position_window_um,
+            lag_max: (LAG_SHARE * (motion.soft_max_mm - motion.soft_min_mm)).max(LAG_MM),
         }
     }
 
@@ -74,6 +83,7 @@ impl Motion {
             acceleration: table.acceleration_deg_per_s2,
             lag: table.following_error_limit_arcsec,
             window: table.position_window_arcsec,
+            lag_max: LAG_SHARE * TURN_DEG,
         }
     }
 
@@ -84,7 +94,8 @@ impl Motion {
 
     fn ramp(&self, judge: &mut Judge<'_>) {
         let ramp_s = self.speed / self.acceleration;
-        if (RAMP_S.0..=RAMP_S.1).contains(&ramp_s) {
+        let is_sudden = ramp_s < RAMP_S.0 && self.acceleration > USUAL;
+        if !is_sudden && ramp_s <= RAMP_S.1 {
             return;
         }
         let [(_, of_speed), (key, unit)] = [self.words.speed, self.words.acceleration];
@@ -112,7 +123,7 @@ impl Motion {
             let help = "give more than the position window, what a move may lag behind";
             judge.say(self.words.lag, cause, help);
         }
-        if self.lag > LAG_SHARE * self.way * per_way {
+        if self.lag > per_way * self.lag_max {
             let (way, of_way) = (Short(self.way), self.words.way);
             let cause = format!(
                 "{lag} {unit} are {} {of_way} of a way of {way} {of_way}: a drive that is stuck is hardly noticed",
@@ -137,7 +148,7 @@ fn check_travel(judge: &mut Judge<'_>, axis: &AxisConfig) {
         judge.say("soft_max_mm", cause, "check both: they are in millimetres");
     }
     let window_mm = motion.position_window_um * 1e-3;
-    if window_mm > WINDOW_SHARE * travel {
+    if window_mm > (WINDOW_SHARE * travel).max(WINDOW_MM) {
         let cause = format!(
             "the axis counts as there {} mm beside its target, of a travel of {} mm",
             Short(window_mm),

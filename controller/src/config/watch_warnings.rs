@@ -9,8 +9,9 @@ use super::least_time::{hangs, least_time, span};
 use super::model::MachineConfig;
 use crate::rotary::RotaryConfig;
 
-/// A shorter time within the window is somebody's wish, however short the moves are.
-const STANDS_MAX_S: f64 = 1.0;
+/// A shorter time within the window, or with a following error, is somebody's wish, however short the moves are: a piezo
+/// goes all its way in a hundredth of a second.
+const WISHED_MAX_S: f64 = 1.0;
 
 /// Without its controller a drive goes on for so long at most, unless somebody wants it otherwise.
 const ALONE_MAX_MS: u16 = 2000;
@@ -126,7 +127,7 @@ impl Watched {
             return;
         };
         let timeout_s = f64::from(timeout) * 1e-3;
-        if timeout_s > self.least_s {
+        if timeout_s > self.least_s.max(WISHED_MAX_S) {
             let cause = format!(
                 "the following error may be too large for {} before the drive says so, and {} takes {}: no move lasts so long",
                 span(timeout_s),
@@ -143,7 +144,7 @@ impl Watched {
 
     fn standing(&self, judge: &mut Judge<'_>) {
         let stands_s = f64::from(self.position_window_time_ms) * 1e-3;
-        if stands_s > self.least_s.max(STANDS_MAX_S) {
+        if stands_s > self.least_s.max(WISHED_MAX_S) {
             let cause = format!(
                 "each move stands within its window for {} before it is there, and {} takes {}",
                 span(stands_s),

@@ -301,12 +301,12 @@ mod tests {
             &[key],
             "takes 4.000 mm, and from soft_min_mm to the limit switch there are 3 mm",
         );
-        let edit = [("settle_ms = 20", "settle_ms = 600000")];
+        let edit = [("settle_ms = 20", "settle_ms = 1200000")];
         check(
             LINEAR,
             &edit,
             &["axis.x.calibrate.settle_ms"],
-            "126 points take 75600s at least",
+            "126 points take 151200s at least",
         );
     }
 

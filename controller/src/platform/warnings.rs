@@ -9,10 +9,8 @@ use units::{Short, ShortSpan};
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
+use crate::config::least_time::RUN_MAX_S;
 use crate::platform::PlatformConfig;
-
-/// Longer than a shift: somebody has taken milliseconds for something else.
-const RUN_MAX: Duration = Duration::from_secs(8 * 3600);
 
 pub(crate) fn warnings(config: &MachineConfig, found: &mut Vec<Finding>) {
     let Some(platform) = &config.platform else {
@@ -51,7 +49,7 @@ fn check_duration(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     let strokes = strokes.map(|it| own.strokes_of(it).targets().len());
     let pictures = strokes.sum::<usize>() * 2 * own.runs as usize;
     let least = Duration::from_millis(platform.settle_ms.into()).saturating_mul(pictures as u32);
-    if least > RUN_MAX {
+    if least.as_secs_f64() > RUN_MAX_S {
         judge.say(
             "settle_ms",
             format!(
@@ -71,12 +69,12 @@ mod tests {
 
     #[test]
     fn times_and_windows_that_do_not_fit_are_told() {
-        let edit = [("settle_ms = 30", "settle_ms = 300000")];
+        let edit = [("settle_ms = 30", "settle_ms = 600000")];
         check(
             UVW,
             &edit,
             &["platform.settle_ms"],
-            "252 pictures takes 75600s",
+            "252 pictures takes 151200s",
         );
         let edit = [("position_window_um = 0.1", "position_window_um = 30.0")];
         check(

@@ -3,8 +3,8 @@
 use units::Short;
 
 use crate::config::MachineConfig;
-use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::{RUN_MAX_S, span};
+use crate::config::judge::{ANY_REACHES, Finding, Judge};
+use crate::config::least_time::{LONG_RUN_MAX_S, span};
 use crate::rotary::{RotaryCalibrateConfig, RotaryConfig};
 
 const TURN_ARCSEC: f64 = 1_296_000.0;
@@ -40,11 +40,11 @@ fn check_tolerance(judge: &mut Judge<'_>, table: &RotaryConfig) {
         );
     }
     let size = table.compensation.as_ref().map(|it| it.size_limit_arcsec);
-    if let Some(size) = size.filter(|it| tolerance > *it) {
+    if let Some(size) = size.filter(|it| tolerance > ANY_REACHES * it) {
         judge.say(
             "verify.tolerance_arcsec",
             format!(
-                "{}″ are more than the errors that are corrected, {}″ (size_limit_arcsec): any table reaches that",
+                "{}″ are far more than the errors that are corrected, {}″ (size_limit_arcsec): any table reaches that",
                 Short(tolerance),
                 Short(size)
             ),
@@ -52,12 +52,17 @@ fn check_tolerance(judge: &mut Judge<'_>, table: &RotaryConfig) {
         );
     }
     let noise = table.calibrate.as_ref().map(|it| it.reading_noise_arcsec);
-    if let Some(noise) = noise.filter(|it| *it > tolerance) {
+    let passes = table.verify.as_ref().map_or(1, |it| it.passes);
+    // Each line is the mean of its readings in both directions.
+    let mean_of = (2.0 * f64::from(passes)).sqrt();
+    if let Some(noise) = noise.filter(|it| it / mean_of > tolerance) {
         judge.say(
             "calibrate.reading_noise_arcsec",
             format!(
-                "a line is read to {}″, and tolerance_arcsec is {}: the scatter of the readings is in what is verified",
+                "a line is read to {}″, the mean of its passes to {}″, and tolerance_arcsec is {}: the scatter of the \
+                 readings is in what is verified",
                 Short(noise),
+                Short((noise / mean_of * 1e4).round() * 1e-4),
                 Short(tolerance)
             ),
             "check both: they are in seconds of arc",
@@ -85,7 +90,7 @@ fn check_run(judge: &mut Judge<'_>, table: &RotaryConfig, run: &RotaryCalibrateC
     let placements = run.placements.unwrap_or(placements as u32);
     let turns = 2.0 * f64::from(run.passes) * f64::from(placements);
     let all_s = turns * 360.0 / run.speed_deg_per_s.unwrap_or(table.speed_deg_per_s);
-    if all_s > RUN_MAX_S {
+    if all_s > LONG_RUN_MAX_S {
         judge.say(
             "calibrate.passes",
             format!("{turns:.0} turns over the plate take {}", span(all_s)),
@@ -155,18 +160,27 @@ mod tests {
     fn what_a_table_is_to_reach_is_judged_by_what_is_corrected_and_read() {
         let from = "tolerance_arcsec = 0.3";
         let key = "rotary.c.verify.tolerance_arcsec";
-        let edit = (from, "tolerance_arcsec = 300.0");
-        let says = "300″ are more than the errors that are corrected, 60″";
+        let edit = (from, "tolerance_arcsec = 3000.0");
+        let says = "3000″ are far more than the errors that are corrected, 60″";
         check(ROTARY, &[edit], &[key], says);
         let edit = ("noise_arcsec = 0.06", "noise_arcsec = 60.0");
         let key = "rotary.c.calibrate.reading_noise_arcsec";
-        let says = "a line is read to 60″, and tolerance_arcsec is 0.3";
+        let says = "a line is read to 60″, the mean of its passes to 42.4264″, and tolerance_arcsec is 0.3";
         check(ROTARY, &[edit], &[key], says);
         let edit = ("limit_arcsec = 0.1", "limit_arcsec = 100.0");
         let key = "rotary.c.calibrate.closure_limit_arcsec";
         check(ROTARY, &[edit], &[key], "may move by 100″");
-        let edit = ("passes = 1  ", "passes = 1000  ");
-        let says = "8000 turns over the plate take 48000s";
-        check(ROTARY, &[edit], &["rotary.c.calibrate.passes"], says);
+        let passes = ("passes = 1  ", "passes = 1000  ");
+        let speed = (
+            "speed_deg_per_s = 60.0\nreading",
+            "speed_deg_per_s = 6.0\nreading",
+        );
+        let says = "8000 turns over the plate take 480000s";
+        check(
+            ROTARY,
+            &[passes, speed],
+            &["rotary.c.calibrate.passes"],
+            says,
+        );
     }
 }

@@ -9,14 +9,14 @@ use crate::linear::ZeroConfig;
 
 /// Samples are taken standing at so many places.
 const PLACES: f64 = 3.0;
-/// A converter that reaches so many times the rails of its sensors is another one.
-const FULL_SCALES: f64 = 10.0;
+/// A converter that reaches so many times the rails of its sensors is another one: one for 10 V reads half a volt well.
+const FULL_SCALES: f64 = 50.0;
 /// An origin that is uncertain by this share of the search is none.
 const UNCERTAIN_SHARE: f64 = 0.1;
-/// A window this many times the uncertainty of the zero says nothing of where the axis is.
-const WINDOWS: f64 = 10.0;
-/// A window of fewer counts is as narrow as the encoder lets it be.
-const WINDOW_COUNTS: f64 = 100.0;
+/// A coarse axis may have a fine zero; a window this many times its uncertainty has another unit.
+const WINDOWS: f64 = 100.0;
+/// What a heavy axis with a scale of its own stands within, however well its zero is known.
+const WINDOW_UM: f64 = 20.0;
 
 pub(super) fn check(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
     let Some(zero) = &axis.zero else {
@@ -112,9 +112,9 @@ fn check_time(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) 
 fn check_full_scale(judge: &mut Judge<'_>, config: &MachineConfig, zero: &ZeroConfig) {
     let analog = config.analog.get(&zero.analog);
     let reach = analog.into_iter().flat_map(|it| &it.full_scale_v);
-    let reach = reach.copied().fold(0.0, f64::max);
+    let reach = reach.copied().fold(f64::INFINITY, f64::min);
     let rail = zero.rail_high_v.abs().max(zero.rail_low_v.abs());
-    if reach > FULL_SCALES * rail {
+    if reach.is_finite() && reach > FULL_SCALES * rail {
         judge.say(
             "zero.rail_high_v",
             format!(
@@ -144,9 +144,9 @@ fn check_uncertainty(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
     }
     let motion = &axis.motion;
     let window_um = motion.position_window_um;
-    let is_wide = window_um * 1e3 > WINDOW_COUNTS * motion.resolution_nm.abs();
+    let is_wide = window_um > WINDOW_UM.max(WINDOWS * limit_um);
     // Where it is verified, the tolerance says what is too wide.
-    if axis.verify.is_none() && is_wide && window_um > WINDOWS * limit_um {
+    if axis.verify.is_none() && is_wide {
         judge.say(
             "position_window_um",
             format!(

@@ -3,7 +3,7 @@
 use units::{Radians, Short};
 
 use crate::config::MachineConfig;
-use crate::config::judge::{Finding, Judge};
+use crate::config::judge::{ANY_REACHES, Finding, Judge};
 use crate::platform::PlatformConfig;
 
 pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, platform: &PlatformConfig) {
@@ -18,11 +18,11 @@ pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, platform: 
         ("verify.tolerance_um", verified),
         ("align.tolerance_um", aligned),
     ] {
-        if let Some(tolerance_um) = tolerance_um.filter(|it| *it > size_um) {
+        if let Some(tolerance_um) = tolerance_um.filter(|it| *it > ANY_REACHES * size_um) {
             judge.say(
                 key,
                 format!(
-                    "{} µm are more than the errors of a screw that are corrected, {} µm (size_limit_um): any platform \
+                    "{} µm are far more than the errors of a screw that are corrected, {} µm (size_limit_um): any platform \
                      reaches that",
                     Short(tolerance_um),
                     Short(size_um)
@@ -90,14 +90,14 @@ mod tests {
     #[test]
     fn tolerances_that_any_platform_keeps_are_told() {
         let edit = ("tolerance_um = 2.0", "tolerance_um = 2000.0");
-        let says = "2000 µm are more than the errors of a screw that are corrected, 20 µm";
+        let says = "2000 µm are far more than the errors of a screw that are corrected, 20 µm";
         check(UVW, &[edit], &["platform.verify.tolerance_um"], says);
         let edit = ("tolerance_um = 0.5", "tolerance_um = 500.0");
         check(
             UVW,
             &[edit],
             &["platform.align.tolerance_um"],
-            "500 µm are more",
+            "500 µm are far more",
         );
         let edit = ("closure_limit_um = 1.0", "closure_limit_um = 1000.0");
         let key = "platform.calibrate.closure_limit_um";

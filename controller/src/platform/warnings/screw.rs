@@ -1,5 +1,7 @@
 //! What is doubtful of how the screws of a platform get their origin and are calibrated.
 
+use std::collections::BTreeSet;
+
 use compensator::platform::Pose;
 use units::{Metres, Radians, Short};
 
@@ -61,7 +63,13 @@ fn check_index(judge: &mut Judge<'_>, screw: &ActuatorConfig, axis: &AxisConfig)
     }
 }
 
-/// What is periodic in a turn is not seen by strokes that are further apart.
+/// Fewer places within a turn show nothing of what repeats with it.
+const PLACES_MIN: usize = 3;
+/// Nobody knows, so many turns on, at which place of its turn a screw is.
+const TURNS_MAX: f64 = 50.0;
+
+/// What is periodic in a turn is not seen by strokes that are always at the same place of it. Those that are further
+/// apart than a turn see it where they come to other places.
 fn check_lead(judge: &mut Judge<'_>, platform: &PlatformConfig, screw: &ActuatorConfig) {
     let Some(run) = platform
         .calibrate
@@ -70,18 +78,28 @@ fn check_lead(judge: &mut Judge<'_>, platform: &PlatformConfig, screw: &Actuator
     else {
         return;
     };
-    let step_mm = run.strokes_of(screw).step_mm;
-    if screw.lead_mm < step_mm {
+    let strokes = run.strokes_of(screw);
+    let (turns, step_mm) = (strokes.step_mm / screw.lead_mm, strokes.step_mm);
+    let count = ((strokes.last_mm - strokes.first_mm) / step_mm).floor() as usize + 1;
+    if turns >= 0.5 && (turns > TURNS_MAX || places(turns, count) < PLACES_MIN) {
         judge.say(
             "lead_mm",
             format!(
-                "a turn is {} mm, and the screw is measured every {} mm: what repeats with each turn is not seen",
+                "a turn is {} mm, and the screw is measured every {} mm: what repeats with each turn is hardly seen",
                 Short(screw.lead_mm),
                 Short(step_mm)
             ),
             "check both: they are in millimetres",
         );
     }
+}
+
+/// At how many places of a turn, a twentieth apart, a screw is when it is measured `count` times, `turns` apart.
+fn places(turns: f64, count: usize) -> usize {
+    const TWENTIETHS: f64 = 20.0;
+    let of_turn =
+        (0..count).map(|at| ((at as f64 * turns).fract() * TWENTIETHS).round() as usize % 20);
+    of_turn.collect::<BTreeSet<_>>().len()
 }
 
 fn check_search(judge: &mut Judge<'_>, platform: &PlatformConfig, longest_mm: f64) {
@@ -161,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_shorter_than_a_step_is_told() {
+    fn a_screw_that_is_measured_at_one_place_of_its_turn_is_told() {
         let key = "platform.actuator[0].lead_mm";
         let edits = [
             ("lead_mm = 2.0", "lead_mm = 0.002"),
@@ -173,6 +191,13 @@ mod tests {
             &[key],
             "a turn is 0.002 mm, and the screw is measured every 0.25 mm",
         );
+        // Always at the same place of its turn, and at eight of them.
+        let says = "a turn is 2 mm, and the screw is measured every 2 mm";
+        let keys = [0, 1, 2].map(|at| format!("platform.actuator[{at}].lead_mm"));
+        let keys = keys.each_ref().map(String::as_str);
+        check(UVW, &[("step_mm = 0.25", "step_mm = 2.0")], &keys, says);
+        let none: [&str; 0] = [];
+        check(UVW, &[("step_mm = 0.25", "step_mm = 0.75")], &none, "");
     }
 
     #[test]

@@ -16,9 +16,12 @@ use crate::volumetric::{
 const INTENSITIES: f64 = 100.0;
 /// A beam this many times as long as the travel is none of this machine.
 const BEAM_LENGTHS: f64 = 10.0;
-/// A sample may be some periods old.
+/// A sample may be some periods old,
 const PERIODS: f64 = 500.0;
-/// What is stuck is noticed within an hour.
+/// and so many seconds, however short they are: what a beam sees drifts slowly.
+const AGE_MAX_S: f64 = 10.0;
+/// A detector of light always has noise, so that one that is stuck is noticed within an hour. Thermometers may show the
+/// same digits for a day, and be asked once in a minute.
 const STUCK_MAX_S: f64 = 3600.0;
 /// Of what differences of channels by their sum can be.
 const RATIO_MAX: f64 = 1.0;
@@ -48,7 +51,7 @@ pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, volume: &V
     }
     for (at, temperature) in volume.temperature.iter().enumerate() {
         let judge = &mut Judge::at(format!("volumetric.temperature[{at}]"), found);
-        check_temperature(judge, config, temperature);
+        check_temperature(judge, temperature);
     }
 }
 
@@ -205,7 +208,7 @@ fn check_roll(judge: &mut Judge<'_>, config: &MachineConfig, roll: &RollConfig) 
     check_stuck(judge, period_s, roll.stuck_samples);
 }
 
-fn check_temperature(judge: &mut Judge<'_>, config: &MachineConfig, own: &TemperatureConfig) {
+fn check_temperature(judge: &mut Judge<'_>, own: &TemperatureConfig) {
     let range_k = own.high_c - own.low_c;
     for (key, what, value_k) in [
         (
@@ -232,14 +235,11 @@ fn check_temperature(judge: &mut Judge<'_>, config: &MachineConfig, own: &Temper
             );
         }
     }
-    let period_s = config.sample_period_s(&own.analog);
-    check_age(judge, period_s, own.age_max_ms);
-    check_stuck(judge, period_s, own.stuck_samples);
 }
 
 fn check_age(judge: &mut Judge<'_>, period_s: f64, age_max_ms: f64) {
     let age_s = age_max_ms * 1e-3;
-    if period_s > 0.0 && age_s > PERIODS * period_s {
+    if age_s > AGE_MAX_S.max(PERIODS * period_s) {
         judge.say(
             "age_max_ms",
             format!(

@@ -3,14 +3,11 @@
 use compensator::volumetric::Axis;
 use units::Short;
 
-use crate::config::judge::{Finding, Judge};
-use crate::config::least_time::{self, RUN_MAX_S, span};
+use crate::config::judge::{ANY_REACHES, COVERED_SHARE, Finding, Judge};
+use crate::config::least_time::{self, LONG_RUN_MAX_S, span};
 use crate::config::{AxisConfig, InstrumentConfig, MachineConfig};
 use crate::volumetric::VolumetricConfig;
 use crate::volumetric::config::VolumetricCalibrateConfig;
-
-/// Less than this share of an axis's travel is seldom all that it works in.
-const COVERED_SHARE: f64 = 0.5;
 
 pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, volume: &VolumetricConfig) {
     let judge = &mut Judge::at("volumetric".into(), found);
@@ -96,7 +93,7 @@ fn check_duration(
     let samples_s = f64::from(own.average_samples) / instrument.readings_per_s();
     let settle_s = own.settle_ms * 1e-3;
     let all_s = (samples_s + settle_s) * places as f64;
-    if all_s > RUN_MAX_S {
+    if all_s > LONG_RUN_MAX_S {
         let key = match settle_s > samples_s {
             true => "calibrate.settle_ms",
             false => "calibrate.average_samples",
@@ -138,11 +135,11 @@ fn check_limit(judge: &mut Judge<'_>, volume: &VolumetricConfig) {
         return;
     };
     let size_um = volume.compensation.size_limit_um;
-    if own.limit_um > size_um {
+    if own.limit_um > ANY_REACHES * size_um {
         judge.say(
             "limit_um",
             format!(
-                "{} µm are more than the errors that are corrected, {} µm (size_limit_um): any machine reaches that",
+                "{} µm are far more than the errors that are corrected, {} µm (size_limit_um): any machine reaches that",
                 Short(own.limit_um),
                 Short(size_um)
             ),
@@ -157,14 +154,17 @@ fn check_limit(judge: &mut Judge<'_>, volume: &VolumetricConfig) {
         squares.sum::<f64>().sqrt()
     };
     let edges = volume.high_mm.iter().zip(&volume.low_mm);
-    let longest_mm = edges.map(|(high, low)| high - low).fold(0.0, f64::max);
+    // A line along the shortest axis is one that machines are accepted by.
+    let shortest_mm = edges
+        .map(|(high, low)| high - low)
+        .fold(f64::INFINITY, f64::min);
     let line_mm = length(&own.from_mm, &own.to_mm);
-    if line_mm < COVERED_SHARE * longest_mm {
+    if line_mm < COVERED_SHARE * shortest_mm {
         judge.say(
             "to_mm",
             format!(
-                "the line that is verified is {line_mm:.3} mm long, and the volume {} mm",
-                Short(longest_mm)
+                "the line that is verified is {line_mm:.3} mm long, and the volume {} mm at least",
+                Short(shortest_mm)
             ),
             "take one through all of the volume",
         );
@@ -182,22 +182,19 @@ mod tests {
         let edits = [
             (
                 "high_mm = [500.0, 400.0, 300.0]",
-                "high_mm = [500.0, 400.0, 100.0]",
+                "high_mm = [500.0, 400.0, 30.0]",
             ),
-            ("from_mm = [0.0, 0.0, 150.0]", "from_mm = [0.0, 0.0, 50.0]"),
+            ("from_mm = [0.0, 0.0, 150.0]", "from_mm = [0.0, 0.0, 15.0]"),
             (
                 "to_mm = [500.0, 400.0, 150.0]",
-                "to_mm = [500.0, 400.0, 50.0]",
+                "to_mm = [500.0, 400.0, 15.0]",
             ),
-            ("step_mm = 50.0", "step_mm = 20.0"),
+            ("step_mm = 50.0", "step_mm = 6.0"),
         ];
-        let says = "0 to 100 mm are 33 % of the travel of axis z, from -3 to 303 mm";
+        let says = "0 to 30 mm are 10 % of the travel of axis z, from -3 to 303 mm";
         check(VOLUMETRIC, &edits, &["volumetric.high_mm"], says);
-        let edit = (
-            "to_mm = [500.0, 400.0, 150.0]",
-            "to_mm = [50.0, 40.0, 150.0]",
-        );
-        let says = "is 64.031 mm long, and the volume 500 mm";
+        let edit = ("to_mm = [500.0, 400.0, 150.0]", "to_mm = [0.5, 0.4, 150.0]");
+        let says = "is 0.640 mm long, and the volume 300 mm at least";
         check(VOLUMETRIC, &[edit], &["volumetric.verify.to_mm"], says);
     }
 
@@ -213,7 +210,7 @@ mod tests {
         let key = "volumetric.calibrate.average_samples";
         let many = ("average_samples = 60\n", "average_samples = 100000\n");
         let says = "has 27 places, at which the machine stands for";
-        let rate = ("sample_rate_hz = 610.35", "sample_rate_hz = 61.035");
+        let rate = ("sample_rate_hz = 610.35", "sample_rate_hz = 6.1035");
         check(VOLUMETRIC, &[edit, many, rate], &[key], says);
     }
 
@@ -221,7 +218,7 @@ mod tests {
     fn what_a_machine_is_to_reach_is_judged_by_what_is_corrected_and_measured() {
         let key = "volumetric.verify.limit_um";
         let edit = ("limit_um = 3.0", "limit_um = 3000.0");
-        let says = "3000 µm are more than the errors that are corrected, 250 µm";
+        let says = "3000 µm are far more than the errors that are corrected, 250 µm";
         check(VOLUMETRIC, &[edit], &[key], says);
         let edit = ("position_window_um = 0.1", "position_window_um = 4.0");
         check(VOLUMETRIC, &[edit], &[key], "axis x counts as there 4 µm");
