@@ -27,19 +27,29 @@ pub(super) fn left_out(
     doubts: &[Doubt],
     mut found_in: impl FnMut(&Table) -> Option<Vec<Finding>>,
 ) -> Vec<Finding> {
-    let mut keys_with = |key: &str, value: Value| {
+    let mut keys_with = |changes: Changes| {
         let mut other = document.clone();
-        let own = value_at(&mut other, key)?;
-        *own = match (&own, value) {
-            (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
-            (_, value) => value,
-        };
+        for (key, value) in changes {
+            let own = value_at(&mut other, &key)?;
+            *own = match (&own, value) {
+                (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
+                // Of a list all are doubted.
+                (Value::Array(items), Value::Float(it)) => {
+                    let one = match items.first() {
+                        Some(Value::Integer(_)) => Value::Integer(it as i64),
+                        _ => Value::Float(it),
+                    };
+                    Value::Array(items.iter().map(|_| one.clone()).collect())
+                }
+                (_, value) => value,
+            };
+        }
         let found = found_in(&other)?;
         Some(found.into_iter().map(|it| it.key).collect::<BTreeSet<_>>())
     };
     for doubt in doubts {
         for value in &doubt.within {
-            let Some(found) = keys_with(&doubt.key, Value::Float(*value)) else {
+            let Some(found) = keys_with(vec![(doubt.key.clone(), Value::Float(*value))]) else {
                 continue;
             };
             findings.retain(|it| found.contains(&it.key));
@@ -53,8 +63,8 @@ pub(super) fn left_out(
     let mut roots: BTreeSet<String> = BTreeSet::new();
     let mut most = BTreeSet::new();
     for root in &all {
-        for value in trials(document, root) {
-            let Some(found) = keys_with(root, value) else {
+        for changes in trials(document, root) {
+            let Some(found) = keys_with(changes) else {
                 continue;
             };
             // Another value that is wrong in another way says nothing.
@@ -75,8 +85,42 @@ pub(super) fn left_out(
     findings
 }
 
-/// Other values that the key could have.
-fn trials(document: &Table, key: &str) -> Vec<Value> {
+/// Keys with other values.
+type Changes = Vec<(String, Value)>;
+
+/// Other values that the key could have: its own, or those of it and of the one that it bounds.
+fn trials(document: &Table, key: &str) -> Vec<Changes> {
+    let own = values(document, key).into_iter();
+    let own = own.map(|value| vec![(key.to_owned(), value)]);
+    own.chain(swapped(document, key)).collect()
+}
+
+/// The two ends of a range, the one as the other.
+fn swapped(document: &Table, key: &str) -> Option<Changes> {
+    const ENDS: [[&str; 2]; 4] = [
+        ["high", "low"],
+        ["max", "min"],
+        ["last", "first"],
+        ["end", "start"],
+    ];
+    let mut document = document.clone();
+    let own = value_at(&mut document, key)?.clone();
+    let partners = ENDS
+        .iter()
+        .flat_map(|[upper, lower]| [(upper, lower), (lower, upper)]);
+    let (section, name) = key.rsplit_once('.')?;
+    let partners = partners.map(|(from, to)| {
+        let words = name.split('_').map(|it| if it == *from { to } else { it });
+        format!("{section}.{}", words.collect::<Vec<_>>().join("_"))
+    });
+    let partner = partners
+        .filter(|it| it != key)
+        .find(|it| value_at(&mut document, it).is_some())?;
+    let other = value_at(&mut document, &partner)?.clone();
+    Some(vec![(key.to_owned(), other), (partner, own)])
+}
+
+fn values(document: &Table, key: &str) -> Vec<Value> {
     let mut document = document.clone();
     let names: Vec<String> = document
         .values()
@@ -123,6 +167,13 @@ fn others(value: &Value, names: &[String]) -> Vec<Value> {
         Value::String(_) => names.iter().cloned().map(Value::String).collect(),
         _ => Vec::new(),
     }
+}
+
+/// The document with another value of that key; `None` where it has no such key.
+pub(super) fn with(document: &Table, key: &str, value: Value) -> Option<Table> {
+    let mut other = document.clone();
+    *value_at(&mut other, key)? = value;
+    Some(other)
 }
 
 /// The value of a key as findings name it: `actuator[0]` is `actuator.0`.

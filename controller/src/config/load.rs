@@ -13,12 +13,14 @@ use super::dependence::hash_of;
 use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
 use super::model::MachineConfig;
+use super::other_units;
 use super::place::{Part, span_of};
 use super::relocated::relocated;
 use super::repair::{Repair, repaired};
 use super::schema;
 use super::structure::{self, Unread};
 use super::syntax::{self, Recovered};
+use super::twins;
 use super::validate::{Finding, validate};
 use super::warnings;
 use super::whole;
@@ -182,6 +184,7 @@ fn read_by<C: DeserializeOwned>(
     let found = structure::judge((&document, &recovered.text), schema, unread);
     let has_nameless = found.has_nameless;
     let (mut findings, repairs, doubts) = (found.findings, found.repairs, found.doubts);
+    let in_other_units = found.converted;
     findings.extend(relocated);
     findings.extend(regrouped);
     let document = repaired(document, &repairs);
@@ -204,6 +207,10 @@ fn read_by<C: DeserializeOwned>(
         .filter(|_| is_whole)
         .flat_map(&mut judge)
         .collect();
+    let judged = other_units::judged(judged, (&document, &in_other_units), &mut findings, |it| {
+        let config = Value::Table(it.clone()).try_into::<C>();
+        Some(judge(&config.ok()?))
+    });
     let judged = consequences::left_out(judged, &document, &doubts, |it| {
         let config = Value::Table(it.clone()).try_into::<C>();
         Some(judge(&config.ok()?))
@@ -233,32 +240,37 @@ fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> 
     // A word where a number belongs is told as that.
     let mistaken: Vec<_> = found.iter().filter(is_mistaken).map(|it| it.line).collect();
     let of_syntax = recovered.findings.into_iter();
-    let of_syntax: Vec<_> = of_syntax
-        .filter(|it| !mistaken.contains(&it.line))
+    found.extend(of_syntax.filter(|it| !mistaken.contains(&it.line)));
+    let found = twins::told(in_order(found));
+    ConfigError::Invalid { findings: found }
+}
+
+/// By lines, but what a section lacks behind what is wrong in it, which it may be.
+fn in_order(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let is_missing = |it: &Diagnostic| it.cause.starts_with("missing");
+    let causes = found.iter().filter(|it| !is_missing(it));
+    let causes = causes.map(|it| {
+        (
+            it.key.rsplit_once('.').map_or("", |it| it.0),
+            &it.key,
+            it.line,
+        )
+    });
+    let causes: Vec<_> = causes
+        .map(|(section, key, line)| (section.to_owned(), key.clone(), line))
         .collect();
-    // What a section lacks may be what cannot be read of it: that is told first.
-    let told_at = |it: &Diagnostic| {
-        let lines = of_syntax
+    found.sort_by_cached_key(|it| {
+        let own = causes
             .iter()
-            .filter(|own| it.cause.starts_with("missing") && is_within(&own.key, &it.key));
-        let last = lines.map(|own| own.line).max();
+            .filter(|(section, key, _)| is_missing(it) && (*section == it.key || *key == it.key));
+        let last = own.map(|it| it.2).max();
         (
             last.unwrap_or_default().max(it.line),
             last.is_some(),
             it.column,
         )
-    };
-    found.sort_by_key(told_at);
-    let places: Vec<_> = found.iter().map(told_at).collect();
-    let mut all: Vec<_> = places.into_iter().zip(found).collect();
-    all.extend(
-        of_syntax
-            .into_iter()
-            .map(|it| ((it.line, false, it.column), it)),
-    );
-    all.sort_by_key(|it| it.0);
-    let found = all.into_iter().map(|it| it.1).collect();
-    ConfigError::Invalid { findings: found }
+    });
+    found
 }
 
 /// Whether `key` is `section` or stands in it.
@@ -403,7 +415,7 @@ mod tests {
             (
                 "turn_below_peak_v = 0.3",
                 "turn_below_peak_v = 3.0",
-                "axis.x.zero",
+                "axis.x.zero.turn_below_peak_v",
             ),
             (
                 "overrun_mm = 0.5",

@@ -25,6 +25,7 @@ mod model;
 mod motion_warnings;
 #[cfg(test)]
 mod mutated_tests;
+mod other_units;
 mod place;
 #[cfg(test)]
 mod reference;
@@ -35,6 +36,7 @@ mod slips;
 mod structure;
 mod syntax;
 mod text_warnings;
+mod twins;
 mod unit;
 pub(crate) mod validate;
 mod wanted;

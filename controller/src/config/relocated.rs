@@ -92,7 +92,13 @@ impl Named {
             return None;
         }
         let is_mistyped = self.is_mistyped(schema);
-        let ways: [Way; 4] = [Self::swapped, Self::parted, Self::shortened, Self::renamed];
+        let ways: [Way; 5] = [
+            Self::swapped,
+            Self::parted,
+            Self::shortened,
+            Self::lengthened,
+            Self::renamed,
+        ];
         for (nth, way) in ways.into_iter().enumerate() {
             // Swapped parts may be like other words; what is like the right ones is told where each is judged.
             // By one key alone nobody is known, and a key with a point in it looks like a section with one.
@@ -114,10 +120,11 @@ impl Named {
         None
     }
 
-    /// Whether any of its keys is known where it stands.
+    /// Whether its keys are known where it stands, but for one that may be mistyped.
     fn is_at_home(&self, schema: &Schema) -> bool {
         let wanted = Wanted::at(schema, &self.parts.join("."));
-        self.keys.iter().any(|it| wanted.has(it))
+        let strange = self.keys.iter().filter(|it| !wanted.has(it)).count();
+        strange < self.keys.len().min(2)
     }
 
     /// Whether its name is like another one: that is told where each part is judged.
@@ -134,8 +141,11 @@ impl Named {
     fn fits(&self, parts: &[String], document: &Table, schema: &Schema) -> bool {
         let wanted = Wanted::at(schema, &parts.join("."));
         let there = at(document, parts);
+        // One more of a list has its own.
+        let is_one_of_a_list = is_list(schema, &parts.join("."));
         let is_free = |key: &String| match there {
             Some(Value::Table(own)) => !own.contains_key(key),
+            Some(Value::Array(_)) => is_one_of_a_list,
             other => other.is_none(),
         };
         self.keys.iter().all(|it| wanted.has(it) && is_free(it))
@@ -178,13 +188,30 @@ impl Named {
     }
 
     /// One part too many.
-    fn shortened(&self, _: &Schema) -> Vec<Name> {
-        let each = (0..self.parts.len()).map(|at| {
+    fn shortened(&self, schema: &Schema) -> Vec<Name> {
+        // What comes last is what a name goes on with.
+        let [whole @ .., _] = &self.parts[..] else {
+            return Vec::new();
+        };
+        let keys = Wanted::at(schema, &whole.join("."));
+        if !whole.is_empty() && self.keys.iter().all(|it| keys.has(it)) {
+            return vec![whole.to_vec()];
+        }
+        let each = (0..whole.len()).map(|at| {
             let mut parts = self.parts.clone();
             parts.remove(at);
             parts
         });
-        each.filter(|it| !it.is_empty()).collect()
+        each.collect()
+    }
+
+    /// One part too few: the first.
+    fn lengthened(&self, schema: &Schema) -> Vec<Name> {
+        let known = schema["properties"].as_object().into_iter().flatten();
+        // `[axis]` lacks another part.
+        let known = known.filter(|_| schema["properties"][&self.parts[0]].is_null());
+        let whole = known.map(|(group, _)| [vec![group.clone()], self.parts.clone()].concat());
+        whole.collect()
     }
 
     /// Another word for one of the parts.

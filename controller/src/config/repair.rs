@@ -75,6 +75,9 @@ pub(super) fn join(other: &mut Table, own: Table) {
     for (key, value) in own {
         match (other.get_mut(&key), value) {
             (Some(Value::Table(inner)), Value::Table(own)) => join(inner, own),
+            (Some(Value::Array(items)), Value::Array(own)) if own.iter().all(Value::is_table) => {
+                items.extend(own);
+            }
             (Some(_), _) => {}
             (None, value) => {
                 other.insert(key, value);

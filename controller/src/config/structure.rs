@@ -44,11 +44,21 @@ pub(super) struct Unread<'a> {
     pub(super) a_section: bool,
 }
 
+/// A key that has another unit than the one that was meant.
+pub(super) struct Converted {
+    /// The place of its finding among all.
+    pub(super) finding: usize,
+    pub(super) key: String,
+    pub(super) value: f64,
+}
+
 /// What is told of a file.
 pub(super) struct Found<'a> {
     pub(super) findings: Findings,
     /// What makes a file that can be read all the same of it, as far as that can be told.
     pub(super) repairs: Vec<Repair>,
+    /// Keys with another unit, each with its finding, the key that was meant and the value in that one's unit.
+    pub(super) converted: Vec<Converted>,
     /// Values outside of what their keys can have.
     pub(super) doubts: Vec<Doubt>,
     unread: Unread<'a>,
@@ -58,6 +68,8 @@ pub(super) struct Found<'a> {
     text: &'a str,
     /// Whether keys stand in a section that lacks its name: what is missing may be theirs.
     pub(super) has_nameless: bool,
+    /// Sections that stand elsewhere, and are told there.
+    told: Vec<String>,
     /// Keys that are not known where they stand, and keys that are missing, each with its finding.
     moved: Moved,
     /// The sections that are being judged, from the outermost on, with the keys that they could still have.
@@ -117,12 +129,14 @@ pub(super) fn judge<'a>(
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
+        converted: Vec::new(),
         doubts: Vec::new(),
         unread,
         schema,
         document,
         text,
         has_nameless: false,
+        told: Vec::new(),
         moved: Moved::default(),
         above: Vec::new(),
     };
@@ -137,12 +151,14 @@ pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
     let mut found = Found {
         findings: Vec::new(),
         repairs: Vec::new(),
+        converted: Vec::new(),
         doubts: Vec::new(),
         unread: Unread::default(),
         schema,
         document: &document,
         text: "",
         has_nameless: false,
+        told: Vec::new(),
         moved: Moved::default(),
         above: Vec::new(),
     };
@@ -214,6 +230,9 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     if schema["properties"].is_null() {
         return named(path, seen, &schema["additionalProperties"], found);
     }
+    if let [first, rest @ ..] = &Section::devices_meant(schema, seen)[..] {
+        return another_device(path, seen, (schema, [&[*first], rest].concat()), found);
+    }
     let section = Section::of(schema, seen);
     let merged = merged(seen, &section);
     let keys = section.keys.keys().copied();
@@ -244,6 +263,7 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     let missed = missed.filter(|it| is_whole && free.contains(it) && !mistyped.contains(it));
     for key in missed {
         let is_told = orphans.as_ref().is_some_and(|it| it.1 == below(path, key));
+        let is_told = is_told || found.told.contains(&below(path, key));
         let is_lost = is_told
             || (found.unread.a_section || found.has_nameless)
                 && is_section(key, section.keys[*key]);
@@ -252,6 +272,33 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
         }
     }
     found.above.pop();
+}
+
+/// The keys of a section are those of another device than it names: the name was wrong.
+fn another_device(
+    path: &str,
+    seen: &Table,
+    (schema, meant): (&Schema, Vec<&str>),
+    found: &mut Found<'_>,
+) {
+    let word = seen[DEVICE].as_str().unwrap_or_default();
+    let cause = format!(
+        "the keys of this section are not those of \"{}\"",
+        shown(word)
+    );
+    let names: Vec<_> = meant.iter().map(|it| format!("\"{it}\"")).collect();
+    let key = below(path, DEVICE);
+    say(
+        found,
+        &key,
+        cause,
+        format!("did you mean {}?", names.join(" or ")),
+    );
+    let value = Value::String(meant[0].to_owned());
+    found.replace(&key, Some(value.clone()));
+    let mut whole = seen.clone();
+    whole.insert(DEVICE.to_owned(), value);
+    table(path, &whole, schema, found);
 }
 
 fn is_section(key: &str, schema: &Schema) -> bool {

@@ -44,10 +44,10 @@ pub(super) fn is_known(unit: &str) -> bool {
     size(unit).is_some()
 }
 
-/// `5k` is five thousand, where the key has a unit of its own.
+/// `5k` is five thousand, where the key is no temperature.
 pub(super) fn magnified(number: &str, unit: &str, key: &str) -> Option<String> {
-    unit_of(key)?;
     let factor = match unit {
+        _ if key.ends_with("_k") || key.ends_with("kelvin") => return None,
         "k" | "K" => 1e3,
         "M" => 1e6,
         _ => return None,

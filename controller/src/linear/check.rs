@@ -198,7 +198,13 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
         && let Err(error) = assemble::hall_settings(zero, &axis.motion).validate()
     {
         let cause = in_keys(&error.to_string());
-        judge.say(key_of(&error), cause, "change one of them");
+        let help = match &error {
+            SettingsError::Order { small, large, .. } => {
+                in_keys(&format!("lower {small}, or raise {large}"))
+            }
+            _ => "change one of them".to_owned(),
+        };
+        judge.say(key_of(&error), cause, help);
     }
 }
 
@@ -222,7 +228,8 @@ fn key_of(error: &SettingsError) -> &'static str {
     let setting = match error {
         SettingsError::NotPositive { setting, .. } => setting,
         SettingsError::BandTooNarrow { band, .. } => band,
-        SettingsError::Order { .. } | SettingsError::NominalOutside { .. } => "",
+        SettingsError::Order { small, .. } => small.split(' ').next().unwrap_or_default(),
+        SettingsError::NominalOutside { .. } => "",
     };
     match setting {
         "vc" => "level_below_peak_v",

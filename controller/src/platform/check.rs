@@ -76,6 +76,21 @@ fn check_lone_homing(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     }
 }
 
+/// No screw goes faster than its own axis may.
+fn check_speed(judge: &mut Judge<'_>, config: &MachineConfig, platform: &PlatformConfig) {
+    let axes = platform
+        .actuator
+        .iter()
+        .filter_map(|it| config.axis.get(&it.axis));
+    let slowest = axes.map(|it| it.motion.speed_max_mm_per_s).reduce(f64::min);
+    judge.within(
+        "speed_mm_per_s",
+        platform.speed_mm_per_s,
+        0.0,
+        slowest.unwrap_or(f64::INFINITY),
+    );
+}
+
 fn check_references(
     findings: &mut Vec<Finding>,
     config: &MachineConfig,
@@ -86,6 +101,11 @@ fn check_references(
         &platform.camera,
         &config.camera,
         "camera",
+    );
+    check_speed(
+        &mut Judge::at("platform".into(), findings),
+        config,
+        platform,
     );
     for (at, actuator) in platform.actuator.iter().enumerate() {
         let judge = &mut Judge::at(format!("platform.actuator[{at}]"), findings);
@@ -112,12 +132,6 @@ fn check_references(
                     "give the position of the first index pulse off the negative limit switch",
                 );
             }
-            judge.within(
-                "axis speed",
-                platform.speed_mm_per_s,
-                0.0,
-                axis.motion.speed_max_mm_per_s,
-            );
         }
     }
 }

@@ -93,7 +93,12 @@ fn by_value(parts: &Parts<'_>, slip: &Slip, wanted: &Wanted<'_>) -> Option<Slip>
 /// A section begins where the line should end.
 fn joined_heading(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
     let value = parts.value?;
-    let at = value.find(" [").filter(|_| value.ends_with(']'))? + 1;
+    let apart = value.find(" [").map(|it| it + 1);
+    // `0.2[axis.x.zero]`, but `5.0[mm]` has a unit behind it.
+    let close = value.find('[').filter(|at| value[*at..].contains('.'));
+    let at = apart
+        .or(close)
+        .filter(|at| *at > 0 && value.ends_with(']'))?;
     let (before, heading) = value.split_at(at);
     let meant = parts.with(before.trim());
     let name = heading.trim_matches(['[', ']']);

@@ -56,10 +56,7 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
     let rest = core.trim_start_matches(['-', '+', ' ']);
     let before = &core[..core.len() - rest.len()];
     // A sentence's end.
-    let rest = rest
-        .strip_suffix('.')
-        .filter(|it| it.contains('.'))
-        .unwrap_or(rest);
+    let rest = rest.strip_suffix('.').unwrap_or(rest);
     let sign = match before.contains('-') {
         true => "-",
         false => "",
@@ -84,6 +81,8 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
     let is_remark =
         (is_word || behind.starts_with(['(', '±', '[']) || behind.starts_with("+/-")) && !is_sum;
     let mut found = Vec::new();
+    let whole = by_unit.as_deref().and_then(|it| it.strip_suffix(".0"));
+    found.extend(whole.map(str::to_owned));
     found.extend(by_unit);
     let joined = rest.replace(" e", "e").replace(" E", "e");
     for text in [Some(joined.as_str()), Some(first).filter(|_| is_remark)] {
@@ -183,7 +182,19 @@ fn text(raw: &str) -> Option<String> {
         true => inner.rsplit('.').next().unwrap_or(inner),
         false => inner,
     };
-    let is_none = ["none", "null", "nil", "nan", "inf", "undefined"];
+    let is_none = [
+        "none",
+        "null",
+        "nil",
+        "nan",
+        "inf",
+        "undefined",
+        "todo",
+        "tbd",
+        "fixme",
+        "xxx",
+        "n/a",
+    ];
     let is_plain = inner.starts_with(|it: char| it.is_alphanumeric() || "/.~_-".contains(it))
         && !inner.contains(['\\', '#', '=', '&']);
     let is_said = !is_none.contains(&inner.to_lowercase().as_str());

@@ -214,6 +214,11 @@ fn backslash(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     if !inner.contains('\\') || inner.contains(['\'', '"']) {
         return None;
     }
+    if inner.starts_with('\\') {
+        let meant = format!("\"{}\"", inner.split('\\').collect::<Vec<_>>().join("/"));
+        let help = format!("write {}", shown(&meant));
+        return parts.value_meant(&meant, "paths have `/` here".into(), help);
+    }
     let meant = format!("'{inner}'");
     let cause = "`\\` has a meaning of its own in a text with double quotes";
     let help = format!("write it with single quotes: {}", shown(&meant));

@@ -19,6 +19,15 @@ pub(super) fn named(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_
         nameless(path, &mut whole, own, found);
     }
     for (key, value) in &whole {
+        if let Value::Table(inner) = value
+            && is_part_of_one(key, inner, own)
+            && let Some(name) = lacking(key, seen)
+        {
+            // Its keys are told with it.
+            found.told.push(below(&below(path, name), key));
+        }
+    }
+    for (key, value) in &whole {
         match value {
             Value::Table(inner) if is_part_of_one(key, inner, own) => {
                 without_name(path, key, seen, found);
@@ -77,18 +86,20 @@ fn is_part_of_one(name: &str, inner: &Table, own: &Schema) -> bool {
     is_key && name != DEVICE && !inner.contains_key(DEVICE)
 }
 
-fn without_name(path: &str, part: &str, seen: &Table, found: &mut Found<'_>) {
-    let key = below(path, part);
+/// The only one of these sections without such a part.
+fn lacking<'a>(part: &str, seen: &'a Table) -> Option<&'a str> {
     let others = seen.iter().filter(|(name, _)| *name != part);
     let lacks = |it: &Value| it.as_table().is_some_and(|it| !it.contains_key(part));
-    let lacking: Vec<_> = others
-        .filter(|(_, it)| lacks(it))
-        .map(|it| it.0.as_str())
-        .collect();
-    let name = match lacking[..] {
-        [one] => one,
-        _ => "NAME",
-    };
+    let mut lacking = others.filter(|(_, it)| lacks(it)).map(|it| it.0.as_str());
+    match (lacking.next(), lacking.next()) {
+        (Some(one), None) => Some(one),
+        _ => None,
+    }
+}
+
+fn without_name(path: &str, part: &str, seen: &Table, found: &mut Found<'_>) {
+    let key = below(path, part);
+    let name = lacking(part, seen).unwrap_or("NAME");
     let cause = format!("`{part}` is a section of one of [{path}.NAME], and says not of which");
     let help = match name {
         "NAME" => format!("write [{path}.NAME.{part}], with the name of one of them"),

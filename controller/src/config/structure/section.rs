@@ -46,6 +46,27 @@ impl<'a> Section<'a> {
         section
     }
 
+    /// The devices that have all keys of `seen`, where the one that it names lacks several.
+    pub(super) fn devices_meant(schema: &'a Schema, seen: &Table) -> Vec<&'a str> {
+        let word = seen.get(DEVICE).and_then(Value::as_str);
+        let lacks = |variant: &Schema| {
+            let keys = seen.keys();
+            keys.filter(|it| schema["properties"][it.as_str()].is_null())
+                .filter(|it| variant["properties"][it.as_str()].is_null())
+                .count()
+        };
+        let named = |variant: &'a Schema| variant["properties"][DEVICE]["const"].as_str();
+        let variants = || schema["oneOf"].as_array().into_iter().flatten();
+        let own = variants().find(|it| named(it) == word && word.is_some());
+        match own.is_some_and(|it| lacks(it) > 1) {
+            true => variants()
+                .filter(|it| lacks(it) == 0)
+                .filter_map(named)
+                .collect(),
+            false => Vec::new(),
+        }
+    }
+
     fn add(&mut self, part: &'a Schema) {
         let keys = part["properties"].as_object().into_iter().flatten();
         self.keys.extend(keys.map(|(key, own)| (key.as_str(), own)));

@@ -4,13 +4,14 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 
 use super::section::Section;
-use super::{Found, any, called, places};
+use super::{Converted, Found, any, called, places};
 use crate::config::judge::Finding;
 use crate::config::lines::below;
 use crate::config::meant::key_meant;
 use crate::config::place::Part;
 use crate::config::repair::{Repair, join};
 use crate::config::schema::without_null;
+use crate::config::unit::converted;
 
 /// The sections of which a part has a mistyped name, `[axes.x]` beside `[axis.x.zero]`, with that part.
 pub(super) fn merged(seen: &Table, section: &Section<'_>) -> Table {
@@ -95,6 +96,17 @@ pub(super) fn unknown<'a>(
     if !is_own {
         found.moved.add_strange(found.findings.len() - 1, name);
     }
+    if let (Some(to), Some(number)) = (named, number_of(value))
+        && let Some(value) = in_the_unit_of(to, name, number)
+    {
+        let key = below(path, to);
+        let finding = found.findings.len() - 1;
+        found.converted.push(Converted {
+            finding,
+            key,
+            value,
+        });
+    }
     let is_judged =
         section.part_meant(name, value).is_some() && !free.contains(&named.unwrap_or_default());
     if let (Some(named), Value::Table(_) | Value::Array(_), false) = (named, value, is_judged) {
@@ -103,15 +115,34 @@ pub(super) fn unknown<'a>(
     meant.filter(|_| named.is_some())
 }
 
+fn number_of(value: &Value) -> Option<f64> {
+    match value {
+        Value::Float(it) => Some(*it),
+        Value::Integer(it) => Some(*it as f64),
+        _ => None,
+    }
+}
+
+/// `-3000.0` of `soft_min_um` as `soft_min_mm`.
+fn in_the_unit_of(key: &str, seen: &str, number: f64) -> Option<f64> {
+    let unit = seen.rsplit('_').next()?;
+    let value = converted(&number.to_string(), unit, key)?.parse().ok()?;
+    (value != number).then_some(value)
+}
+
 /// `stage.serial` is a section with a key, and was meant to be a key.
 fn joined<'a>(name: &str, value: &Value, section: &Section<'a>) -> Option<&'a str> {
-    let mut keys = value.as_table()?.keys();
-    let (only, rest) = (keys.next()?, keys.next());
+    let mut entries = value.as_table()?.iter();
+    let ((only, inner), None) = (entries.next()?, entries.next()) else {
+        return None;
+    };
     let joined = format!("{name}_{only}");
     // `self.speed`, as in a program.
     let known = [joined.as_str(), only].into_iter();
     let mut known = known.filter_map(|it| section.keys.get_key_value(it));
-    known.next().filter(|_| rest.is_none()).map(|it| *it.0)
+    let own = known.next().map(|it| *it.0);
+    // `instrument.laser.average_samples`, by its whole path.
+    own.or_else(|| self::joined(only, inner, section))
 }
 
 /// Keys of another section, of which the heading above them is missing: at least two, all of one.

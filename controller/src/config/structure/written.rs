@@ -124,7 +124,9 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
 /// `"0.01 um"` of a key in nanometres.
 fn in_other_unit(text: &str, key: &str) -> Option<String> {
     let (number, unit) = split_unit(text.trim())?;
-    let other = unit::converted(number, unit?, key)?;
+    let unit = unit?;
+    let other =
+        unit::magnified(number, unit, key).or_else(|| unit::converted(number, unit, key))?;
     (other.parse() != number.parse::<f64>()).then_some(other)
 }
 

@@ -132,7 +132,8 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
         };
         let line = axis.port();
         let key = format!("axis.{name}.address");
-        if owned.insert(line, key.clone()).is_none() {
+        if !owned.contains_key(line) {
+            owned.insert(line, key.clone());
             check_rate(
                 &mut Judge::at(format!("serial.{line}"), findings),
                 config.serial.get(line),
