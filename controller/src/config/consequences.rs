@@ -35,11 +35,7 @@ pub(super) fn left_out(
                 (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
                 // Of a list all are doubted.
                 (Value::Array(items), Value::Float(it)) => {
-                    let one = match items.first() {
-                        Some(Value::Integer(_)) => Value::Integer(it as i64),
-                        _ => Value::Float(it),
-                    };
-                    Value::Array(items.iter().map(|_| one.clone()).collect())
+                    Value::Array(items.iter().map(|_| Value::Float(it)).collect())
                 }
                 (_, value) => value,
             };

@@ -16,8 +16,12 @@ pub(super) fn judged(
     mut found_in: impl FnMut(&Table) -> Option<Vec<Finding>>,
 ) -> Vec<Finding> {
     for it in converted {
-        let other = with(document, &it.key, Value::Float(it.value));
-        let Some(other) = other.and_then(|it| found_in(&it)) else {
+        // A key of whole numbers takes no others.
+        let ways = [Value::Float(it.value), Value::Integer(it.value as i64)];
+        let mut ways = ways
+            .into_iter()
+            .filter_map(|value| with(document, &it.key, value));
+        let Some(other) = ways.find_map(|it| found_in(&it)) else {
             continue;
         };
         let key = it.key.rsplit('.').next().unwrap_or_default();

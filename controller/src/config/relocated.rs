@@ -92,6 +92,8 @@ impl Named {
             return None;
         }
         let is_mistyped = self.is_mistyped(schema);
+        /// A part of a section that is there is known by one key.
+        const LENGTHENED: usize = 3;
         let ways: [Way; 5] = [
             Self::swapped,
             Self::parted,
@@ -102,10 +104,14 @@ impl Named {
         for (nth, way) in ways.into_iter().enumerate() {
             // Swapped parts may be like other words; what is like the right ones is told where each is judged.
             // By one key alone nobody is known, and a key with a point in it looks like a section with one.
-            if nth > 0 && (is_mistyped || self.keys.len() < 2) {
-                return None;
+            let is_short = self.keys.len() < 2;
+            if nth > 0 && (is_mistyped || is_short && nth != LENGTHENED) {
+                continue;
             }
             let mut found = way(self, schema);
+            if is_short && nth == LENGTHENED {
+                found.retain(|it| it.len() > 2 && at(document, &it[..it.len() - 1]).is_some());
+            }
             found.retain(|it| *it != self.parts && self.fits(it, document, schema));
             found.sort();
             found.dedup();
@@ -178,6 +184,8 @@ impl Named {
             let places = rest.char_indices().map(|(at, _)| at);
             let own = Wanted::at(schema, group);
             let is_word = move |it: &Name| match it.first() {
+                // `can0` is a name by itself.
+                Some(first) if first.starts_with(|it: char| it.is_ascii_digit()) => false,
                 Some(first) => own.has(first) || !rest[1..].contains('.'),
                 None => false,
             };

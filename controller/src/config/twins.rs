@@ -30,9 +30,7 @@ pub(super) fn told(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
         let Some(meant) = key_meant(key, &names) else {
             continue;
         };
-        let help = format!(
-            "one of them was meant to be `{meant}`, which is missing: write that, or leave one out"
-        );
+        let help = format!("one of them was meant to be `{meant}`, which is missing: write that");
         gone.extend(missing.iter().filter(|it| it.1 == meant).map(|it| it.0));
         findings[at].help = help;
     }

@@ -139,7 +139,9 @@ pub(super) fn section_meant(schema: &Schema, parts: &[&str]) -> Option<String> {
 pub(super) fn is_list(schema: &Schema, path: &str) -> bool {
     let (section, name) = path.rsplit_once('.').unwrap_or(("", path));
     let ways = Wanted::at(schema, section).ways(name);
-    ways.iter().any(|it| it["items"]["properties"].is_object())
+    // Where there can be one by itself, too, that is what is written.
+    let is_one = ways.iter().any(|it| it["properties"].is_object());
+    !is_one && ways.iter().any(|it| it["items"]["properties"].is_object())
 }
 
 #[cfg(test)]

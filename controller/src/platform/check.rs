@@ -6,6 +6,7 @@ use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
+use crate::hardware::drive::MotionConfig;
 use crate::platform::config::{PARTS, PlatformCalibrateConfig, PlatformConfig, StrokesConfig};
 use crate::platform::kinematics;
 
@@ -76,18 +77,27 @@ fn check_lone_homing(judge: &mut Judge<'_>, platform: &PlatformConfig) {
     }
 }
 
-/// No screw goes faster than its own axis may.
+/// No screw goes faster than its own axis may, nor gathers speed faster.
 fn check_speed(judge: &mut Judge<'_>, config: &MachineConfig, platform: &PlatformConfig) {
-    let axes = platform
-        .actuator
-        .iter()
-        .filter_map(|it| config.axis.get(&it.axis));
-    let slowest = axes.map(|it| it.motion.speed_max_mm_per_s).reduce(f64::min);
+    let least = |of: fn(&MotionConfig) -> f64| {
+        let axes = platform
+            .actuator
+            .iter()
+            .filter_map(|it| config.axis.get(&it.axis));
+        axes.map(|it| of(&it.motion)).fold(f64::INFINITY, f64::min)
+    };
+    let (speed, acceleration) = (platform.speed_mm_per_s, platform.acceleration_mm_per_s2);
     judge.within(
         "speed_mm_per_s",
-        platform.speed_mm_per_s,
+        speed,
         0.0,
-        slowest.unwrap_or(f64::INFINITY),
+        least(|it| it.speed_max_mm_per_s),
+    );
+    judge.within(
+        "acceleration_mm_per_s2",
+        acceleration,
+        0.0,
+        least(|it| it.acceleration_mm_per_s2),
     );
 }
 
@@ -124,14 +134,13 @@ fn check_references(
         }
         let [x, y] = actuator.direction;
         judge.within("direction", hypot(x, y), 1e-6, 1e6);
-        if let Some(axis) = config.axis.get(&actuator.axis) {
-            if actuator.index_mm >= axis.motion.soft_max_mm {
-                judge.say(
-                    "index_mm",
-                    "the index lies beyond the upper soft limit",
-                    "give the position of the first index pulse off the negative limit switch",
-                );
-            }
+        let axis = config.axis.get(&actuator.axis);
+        if axis.is_some_and(|it| actuator.index_mm >= it.motion.soft_max_mm) {
+            judge.say(
+                "index_mm",
+                "the index lies beyond the upper soft limit",
+                "give the position of the first index pulse off the negative limit switch",
+            );
         }
     }
 }

@@ -353,7 +353,9 @@ fn without_invention(slip: Slip, parts: &Parts<'_>, wanted: &Wanted<'_>) -> Slip
     }
     let keys = wanted.keys();
     let longer = keys.iter().filter(|it| it.starts_with(word)).count();
-    match key_meant(word, &keys).filter(|_| longer < 2) {
+    // Words of a sentence are no value.
+    let is_prose = parts.said.split_whitespace().count() > 4;
+    match key_meant(word, &keys).filter(|_| longer < 2 && !is_prose) {
         Some(key) if is_alone => Slip {
             help: format!("write `{key} = value`, or remove it"),
             ..slip

@@ -4,7 +4,7 @@
 use serde_json::Value as Schema;
 
 use crate::config::schema::type_of;
-use crate::config::unit::{converted, is_known, split_unit};
+use crate::config::unit::{converted, is_known, magnified, split_unit};
 use crate::config::wanted::Wanted;
 
 /// What `raw` was meant to be, as a value of `key`; `None` where that cannot be told.
@@ -67,7 +67,10 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
     if rest != first && is_either(first) {
         return Vec::new();
     }
-    let by_unit = split_unit(&bare).and_then(|(number, unit)| converted(number, unit?, key));
+    let by_unit = split_unit(&bare).and_then(|(number, unit)| {
+        let unit = unit?;
+        magnified(number, unit, key).or_else(|| converted(number, unit, key))
+    });
     // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
     let behind = rest[first.len()..].trim_start();
     let is_word = behind.chars().take(2).all(char::is_alphabetic) && behind.len() > 1;

@@ -63,6 +63,21 @@ pub(super) fn with_a_name(path: &str, near: &str, document: &Table) -> String {
     }
 }
 
+/// Whether each section of this path has that key: `axis.NAME` are all of `axis`.
+pub(super) fn all_have(path: &str, key: &str, document: &Table) -> bool {
+    let (group, rest) = path.split_once(".NAME").unwrap_or((path, ""));
+    let whole = |name: &str| match path.contains(".NAME") {
+        true => below(group, name) + rest,
+        false => path.to_owned(),
+    };
+    let names = document.get(group).and_then(Value::as_table);
+    let mut names = names.into_iter().flat_map(|it| it.keys());
+    match path.contains(".NAME") {
+        true => names.all(|it| is_there(&below(&whole(it), key), document)),
+        false => is_there(&below(path, key), document),
+    }
+}
+
 /// Whether a section of this path is in the document.
 pub(super) fn is_there(path: &str, document: &Table) -> bool {
     let mut parts = path.split('.');

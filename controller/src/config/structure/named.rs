@@ -130,7 +130,10 @@ fn with_strays(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) ->
             [only] => Some(only),
             _ => None,
         });
-        let Some(meant) = meant else { continue };
+        let Some(meant) = meant else {
+            of_another_group((path, name), parts, &mut whole, found);
+            continue;
+        };
         if is_called(name, found.document) && !is_called(meant, found.document) {
             misnamed(path, (meant, name), &mut whole, found);
             continue;
@@ -149,6 +152,42 @@ fn with_strays(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) ->
         tell(found, key, cause, help);
     }
     whole
+}
+
+/// `[axis.c.compensation]` where `c` is a rotary table without one.
+fn of_another_group(
+    (path, name): (&str, &str),
+    parts: &Table,
+    whole: &mut Table,
+    found: &mut Found<'_>,
+) {
+    let lacks = |group: &str, own: &Value| {
+        let schema = &found.schema["properties"][group]["additionalProperties"]["properties"];
+        own.get(name).is_some_and(|it| {
+            parts
+                .keys()
+                .all(|key| it.get(key).is_none() && !schema[key.as_str()].is_null())
+        })
+    };
+    let groups = found
+        .document
+        .iter()
+        .filter(|(group, own)| *group != path && lacks(group, own));
+    let mut groups = groups.map(|it| it.0.as_str());
+    let (Some(group), None) = (groups.next(), groups.next()) else {
+        return;
+    };
+    let key = below(path, name);
+    let told: Vec<String> = parts
+        .keys()
+        .map(|it| below(&below(group, name), it))
+        .collect();
+    let cause = format!("there is no [{key}], and a section of it");
+    let help = format!("did you mean [{}]?", below(group, name));
+    found.told.extend(told);
+    whole.remove(name);
+    found.repairs.push(Repair::Remove { key: key.clone() });
+    tell(found, key, cause, help);
 }
 
 /// Whether a value of the file names it: the drive's bus, an axis' sensors.

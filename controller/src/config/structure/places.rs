@@ -1,7 +1,9 @@
 //! Where a key is at home that stands where it is not known.
 
 use serde_json::Value as Schema;
+use toml::Table;
 
+use super::called;
 use crate::config::lines::below;
 
 /// So many sections are named at most.
@@ -40,6 +42,18 @@ pub(in crate::config) fn with_all(schema: &Schema, keys: &[&str]) -> Vec<String>
     });
     let common = each.reduce(|all, own| all.into_iter().filter(|it| own.contains(it)).collect());
     common.unwrap_or_default()
+}
+
+/// The only section that has `key`, where it is known by name and is not in the file.
+pub(super) fn lost(
+    (schema, document): (&Schema, &Table),
+    (path, key): (&str, &str),
+) -> Option<String> {
+    let homes = with_all(schema, &[key]);
+    let [home] = &homes[..] else { return None };
+    let home = called::with_a_name(home, path, document);
+    let is_lost = !home.is_empty() && !home.contains("NAME") && !called::is_there(&home, document);
+    is_lost.then_some(home)
 }
 
 fn walk(schema: &Schema, path: &str, key: &str, found: &mut Vec<String>) {

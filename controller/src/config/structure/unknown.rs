@@ -75,6 +75,18 @@ pub(super) fn unknown<'a>(
         found.moved.add_strange(found.findings.len() - 1, name);
         return None;
     }
+    // A key of a section that is not there is no other one that was mistyped.
+    let lost = match key_meant(name, &section.lacking(free)) {
+        Some(_) => None,
+        None => places::lost((schema, found.document), (path, name)),
+    };
+    if let Some(home) = lost {
+        let help =
+            format!("`{name}` is a key of [{home}], which is not there: write that line above it");
+        tell("there is no such key here".to_owned(), help, remove());
+        found.moved.add_strange(found.findings.len() - 1, name);
+        return None;
+    }
     // What must be there and is not comes first.
     let lacks = key_meant(name, &section.lacking(free));
     let meant = lacks.or_else(|| key_meant(name, free));
@@ -125,8 +137,13 @@ fn number_of(value: &Value) -> Option<f64> {
 
 /// `-3000.0` of `soft_min_um` as `soft_min_mm`.
 fn in_the_unit_of(key: &str, seen: &str, number: f64) -> Option<f64> {
-    let unit = seen.rsplit('_').next()?;
-    let value = converted(&number.to_string(), unit, key)?.parse().ok()?;
+    let words: Vec<&str> = seen.split('_').collect();
+    let unit = match words[..] {
+        [.., above, "per", below] => format!("{above}/{below}"),
+        [.., last] => last.to_owned(),
+        [] => return None,
+    };
+    let value = converted(&number.to_string(), &unit, key)?.parse().ok()?;
     (value != number).then_some(value)
 }
 
@@ -215,11 +232,12 @@ fn elsewhere(
         && !home.is_empty()
     {
         let home = called::with_a_name(home, path, document);
+        if called::all_have(&home, key, document) {
+            return format!("`{key}` is a key of [{home}], which has it: remove it here");
+        }
         return match called::is_there(&home, document) || home.contains("NAME") {
             true => format!("`{key}` is a key of [{home}]: write it there"),
-            false => format!(
-                "`{key}` is a key of [{home}], which is not there: write that line above it"
-            ),
+            false => advice(None, free),
         };
     }
     match places::of(schema, key) {

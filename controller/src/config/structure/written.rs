@@ -15,6 +15,7 @@ pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Valu
         ("integer", Value::String(text)) => {
             let other = in_other_unit(text, key).map(without_decimals);
             let number = other.as_deref().or_else(|| number_in(text))?.trim();
+            let number = without_decimals(number.to_owned());
             number.parse().ok().map(Value::Integer)
         }
         ("integer", Value::Float(it)) if it.fract() == 0.0 => Some(Value::Integer(*it as i64)),
@@ -76,6 +77,10 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
                     format!("write {number}, which is {text} in the key's unit")
                 }
                 (None, Some(number)) if number == text => {
+                    let number = match expected {
+                        "integer" => without_decimals(number.to_owned()),
+                        _ => number.to_owned(),
+                    };
                     format!("write it without quotes: {number}")
                 }
                 (None, Some(number)) => {

@@ -179,9 +179,9 @@ impl<'a> Place<'a> {
         let cause = format!("{what} stands here a second time; line {number} has it first");
         let help = match is_section {
             true => match self.lacking(wanted) {
-                Some(other) => format!(
-                    "one of them was meant to be [{other}], which is missing: write that, or leave one out"
-                ),
+                Some(other) => {
+                    format!("one of them was meant to be [{other}], which is missing: write that")
+                }
                 None => "leave one of them out".to_owned(),
             },
             false => {

@@ -38,7 +38,7 @@ pub struct Umd2Config {
     #[schemars(range(min = -0.0001, max = 0.0001))]
     #[schemars(extend("x-own" = true))]
     pub expansion_per_kelvin: f64,
-    /// Whether for the dead path; needs `correct_air`.
+    /// Whether for the dead path; without `correct_air` it is not.
     pub correct_dead_path: bool,
     /// Path in air between optic and reflector at the axis's zero.
     #[schemars(range(min = 0.0, max = 100000.0))]
