@@ -44,7 +44,7 @@ pub(in crate::config) fn with_all(schema: &Schema, keys: &[&str]) -> Vec<String>
     common.unwrap_or_default()
 }
 
-/// The only section that has `key`, where it is known by name and is not in the file.
+/// What to say of a key of one section alone that is known by name and is not in the file.
 pub(super) fn lost(
     (schema, document): (&Schema, &Table),
     (path, key): (&str, &str),
@@ -53,7 +53,9 @@ pub(super) fn lost(
     let [home] = &homes[..] else { return None };
     let home = called::with_a_name(home, path, document);
     let is_lost = !home.is_empty() && !home.contains("NAME") && !called::is_there(&home, document);
-    is_lost.then_some(home)
+    is_lost.then(|| {
+        format!("`{key}` is a key of [{home}], which is not there: write that line above it")
+    })
 }
 
 fn walk(schema: &Schema, path: &str, key: &str, found: &mut Vec<String>) {

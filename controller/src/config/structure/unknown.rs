@@ -75,18 +75,6 @@ pub(super) fn unknown<'a>(
         found.moved.add_strange(found.findings.len() - 1, name);
         return None;
     }
-    // A key of a section that is not there is no other one that was mistyped.
-    let lost = match key_meant(name, &section.lacking(free)) {
-        Some(_) => None,
-        None => places::lost((schema, found.document), (path, name)),
-    };
-    if let Some(home) = lost {
-        let help =
-            format!("`{name}` is a key of [{home}], which is not there: write that line above it");
-        tell("there is no such key here".to_owned(), help, remove());
-        found.moved.add_strange(found.findings.len() - 1, name);
-        return None;
-    }
     // What must be there and is not comes first.
     let lacks = key_meant(name, &section.lacking(free));
     let meant = lacks.or_else(|| key_meant(name, free));
@@ -94,7 +82,9 @@ pub(super) fn unknown<'a>(
         key: key.clone(),
         to: to.to_owned(),
     };
-    let (help, repair, named) = match (section.part_meant(name, value), home, meant) {
+    // A key of a section that is not there is no other one that was mistyped.
+    let lost = places::lost((schema, found.document), (path, name)).filter(|_| lacks.is_none());
+    let (help, repair, named) = match (section.part_meant(name, value), home.or(lost), meant) {
         (Some(part), _, _) => (format!("did you mean `{part}`?"), renamed(part), Some(part)),
         (None, Some(home), _) => (home, remove(), None),
         (None, None, Some(key)) => (advice(meant, free), renamed(key), Some(key)),
@@ -108,8 +98,24 @@ pub(super) fn unknown<'a>(
     if !is_own {
         found.moved.add_strange(found.findings.len() - 1, name);
     }
-    if let (Some(to), Some(number)) = (named, number_of(value))
-        && let Some(value) = in_the_unit_of(to, name, number)
+    in_other_unit((path, name), named, value, found);
+    let is_judged =
+        section.part_meant(name, value).is_some() && !free.contains(&named.unwrap_or_default());
+    if let (Some(named), Value::Table(_) | Value::Array(_), false) = (named, value, is_judged) {
+        any(&key, value, section.keys[named], found);
+    }
+    meant.filter(|_| named.is_some())
+}
+
+/// Notes what a number of another unit is in that of the key `to`; its finding is the last one.
+fn in_other_unit(
+    (path, seen): (&str, &str),
+    to: Option<&str>,
+    value: &Value,
+    found: &mut Found<'_>,
+) {
+    if let (Some(to), Some(number)) = (to, number_of(value))
+        && let Some(value) = in_the_unit_of(to, seen, number)
     {
         let key = below(path, to);
         let finding = found.findings.len() - 1;
@@ -119,12 +125,6 @@ pub(super) fn unknown<'a>(
             value,
         });
     }
-    let is_judged =
-        section.part_meant(name, value).is_some() && !free.contains(&named.unwrap_or_default());
-    if let (Some(named), Value::Table(_) | Value::Array(_), false) = (named, value, is_judged) {
-        any(&key, value, section.keys[named], found);
-    }
-    meant.filter(|_| named.is_some())
 }
 
 fn number_of(value: &Value) -> Option<f64> {
