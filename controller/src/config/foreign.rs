@@ -12,6 +12,10 @@ use super::lines::below;
 use super::slips::{informed, is_toml};
 use super::wanted::{Wanted, is_list};
 
+/// No section has more lines, nor sections in more sections.
+const LINES_MAX: usize = 200;
+const DEPTH_MAX: usize = 6;
+
 /// What a section says, in whatever language: lines count from the first of it.
 #[derive(Debug, Default)]
 struct Node {
@@ -74,6 +78,7 @@ pub(super) struct Foreign {
 
 /// What begins on the first of `lines`, if it is a section of another language that ends.
 pub(super) fn of(lines: &[&str], around: &Around<'_>) -> Option<Foreign> {
+    let lines = &lines[..lines.len().min(LINES_MAX)];
     let tree = braces::read(lines)
         .or_else(|| tags::read(lines))
         .or_else(|| indents::read(lines))?;

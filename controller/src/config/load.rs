@@ -207,14 +207,13 @@ fn read_by<C: DeserializeOwned>(
         .filter(|_| is_whole)
         .flat_map(&mut judge)
         .collect();
-    let judged = other_units::judged(judged, (&document, &in_other_units), &mut findings, |it| {
+    let mut found_in = |it: &Table| {
         let config = Value::Table(it.clone()).try_into::<C>();
         Some(judge(&config.ok()?))
-    });
-    let judged = consequences::left_out(judged, &document, &doubts, |it| {
-        let config = Value::Table(it.clone()).try_into::<C>();
-        Some(judge(&config.ok()?))
-    });
+    };
+    let of_units = (document, &in_other_units[..]);
+    let (judged, document) = other_units::judged(judged, of_units, &mut findings, &mut found_in);
+    let judged = consequences::left_out(judged, &document, &doubts, found_in);
     for finding in judged {
         // What is impossible by itself is told once, and not again of the section around it.
         if !told.iter().any(|key| is_within(key, &finding.key)) {

@@ -4,11 +4,14 @@ use serde_json::Value as Schema;
 use toml::{Table, Value};
 
 use super::judge::Finding;
+use super::lines::below;
 use super::place::Part;
 use super::repair::join;
 use super::structure::Findings;
 use super::wanted::{Wanted, is_list, section_meant};
 
+/// So many sections under strange names are looked for at most.
+const STRANGE_MAX: usize = 25;
 /// More parts than this no section's name has.
 const PARTS_MAX: usize = 4;
 
@@ -17,7 +20,9 @@ pub(super) fn relocated(mut document: Table, schema: &Schema) -> (Table, Finding
     let mut sections = Vec::new();
     walk(&document, &mut Vec::new(), &mut sections);
     let mut findings = Findings::new();
-    for it in sections {
+    // A file with more of them is no configuration of ours.
+    let strange = sections.into_iter().filter(|it| !it.is_at_home(schema));
+    for it in strange.take(STRANGE_MAX) {
         let Some(meant) = it.meant(&document, schema) else {
             continue;
         };
@@ -88,9 +93,6 @@ fn is_section(value: &Value) -> bool {
 impl Named {
     /// The only place that has all its keys and a name that is made of the same parts, or of all but one of them.
     fn meant(&self, document: &Table, schema: &Schema) -> Option<Name> {
-        if self.is_at_home(schema) {
-            return None;
-        }
         let is_mistyped = self.is_mistyped(schema);
         /// A part of a section that is there is known by one key.
         const LENGTHENED: usize = 3;
@@ -128,7 +130,7 @@ impl Named {
 
     /// Whether its keys are known where it stands, but for one that may be mistyped.
     fn is_at_home(&self, schema: &Schema) -> bool {
-        let wanted = Wanted::at(schema, &self.parts.join("."));
+        let wanted = keys_of(schema, &self.parts);
         let strange = self.keys.iter().filter(|it| !wanted.has(it)).count();
         strange < self.keys.len().min(2)
     }
@@ -138,14 +140,15 @@ impl Named {
         let parts: Vec<&str> = self.parts.iter().map(String::as_str).collect();
         let meant = section_meant(schema, &parts);
         meant.is_some_and(|it| {
-            let wanted = Wanted::at(schema, &it);
+            let parts: Name = it.split('.').map(str::to_owned).collect();
+            let wanted = keys_of(schema, &parts);
             it != self.parts.join(".") && self.keys.iter().any(|key| wanted.has(key))
         })
     }
 
     /// Whether all its keys are known there, and none of them is there already.
     fn fits(&self, parts: &[String], document: &Table, schema: &Schema) -> bool {
-        let wanted = Wanted::at(schema, &parts.join("."));
+        let wanted = keys_of(schema, parts);
         let there = at(document, parts);
         // One more of a list has its own.
         let is_one_of_a_list = is_list(schema, &parts.join("."));
@@ -186,7 +189,7 @@ impl Named {
             let is_word = move |it: &Name| match it.first() {
                 // `can0` is a name by itself.
                 Some(first) if first.starts_with(|it: char| it.is_ascii_digit()) => false,
-                Some(first) => own.has(first) || !rest[1..].contains('.'),
+                Some(first) => own.has(first) || !rest.chars().skip(1).any(|it| it == '.'),
                 None => false,
             };
             let ways = places.map(move |at| split(rest, at)).filter(is_word);
@@ -201,7 +204,7 @@ impl Named {
         let [whole @ .., _] = &self.parts[..] else {
             return Vec::new();
         };
-        let keys = Wanted::at(schema, &whole.join("."));
+        let keys = keys_of(schema, whole);
         if !whole.is_empty() && self.keys.iter().all(|it| keys.has(it)) {
             return vec![whole.to_vec()];
         }
@@ -236,6 +239,18 @@ impl Named {
         });
         others.collect()
     }
+}
+
+/// What a section of that name can hold, each one of a list alike.
+fn keys_of<'a>(schema: &'a Schema, parts: &[String]) -> Wanted<'a> {
+    let path = parts.iter().fold(String::new(), |path, part| {
+        let path = below(&path, part);
+        match Wanted::at(schema, &path).keys().is_empty() && is_list(schema, &path) {
+            true => below(&path, "0"),
+            false => path,
+        }
+    });
+    Wanted::at(schema, &path)
 }
 
 fn orders(parts: &[String]) -> Vec<Name> {
@@ -279,6 +294,22 @@ mod tests {
     use crate::config::{ConfigError, parse};
 
     const LINEAR: &str = include_str!("../../../configs/machines/linear.toml");
+
+    #[test]
+    fn one_of_a_list_goes_with_the_others() {
+        let uvw = include_str!("../../../configs/machines/uvw.toml");
+        for wrong in ["[[platformactuator]]", "[[actuator.platform]]"] {
+            let text = uvw.edit_first("[[platform.actuator]]", wrong);
+            let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+                panic!("{wrong} is no section")
+            };
+            assert_eq!(findings.len(), 1, "{findings:#?}");
+            assert!(
+                findings[0].help.contains("`[[platform.actuator]]`"),
+                "{findings:#?}"
+            );
+        }
+    }
 
     #[test]
     fn a_section_under_another_name_is_known_by_its_keys() {

@@ -183,7 +183,7 @@ impl<'a> Parts<'a> {
 
 /// Where the comment of a line begins: at the first # outside quotes; with a quotation mark too few at the last one
 /// behind a space.
-fn comment_at(line: &str) -> usize {
+pub(super) fn comment_at(line: &str) -> usize {
     let mut open = None;
     for (at, it) in line.char_indices() {
         match (open, it) {
@@ -289,7 +289,7 @@ fn equals(parts: &Parts<'_>) -> Option<Slip> {
         return told(0, "there is no key before the `=`", help.into(), None);
     }
     if value.is_empty() {
-        let help = format!("write a value behind it, or remove `{}`", shown(parts.key));
+        let help = "write a value behind it".to_owned();
         let at = parts.said.trim_end().len();
         return told(at, "there is no value behind the `=`", help, None);
     }

@@ -50,6 +50,8 @@ pub(super) struct Converted {
     /// The place of its finding among all.
     pub(super) finding: usize,
     pub(super) key: String,
+    /// As it stands.
+    pub(super) seen: f64,
     pub(super) value: f64,
 }
 

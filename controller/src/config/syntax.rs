@@ -146,7 +146,8 @@ pub(super) fn recovered(text: &str, file: &str, schema: &Schema) -> Recovered {
             section: &section.path,
             headings: &headings,
         };
-        if !is_toml(&whole)
+        if found.findings.len() <= TOLD_MAX
+            && !is_toml(&whole)
             && let Some(foreign) = foreign::of(&lines[at..], &around)
         {
             at += foreign.count;

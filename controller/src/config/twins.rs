@@ -30,7 +30,7 @@ pub(super) fn told(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
         let Some(meant) = key_meant(key, &names) else {
             continue;
         };
-        let help = format!("one of them was meant to be `{meant}`, which is missing: write that");
+        let help = format!("did you mean `{meant}` by one of them? It is missing");
         gone.extend(missing.iter().filter(|it| it.1 == meant).map(|it| it.0));
         findings[at].help = help;
     }

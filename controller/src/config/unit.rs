@@ -45,9 +45,13 @@ pub(super) fn is_known(unit: &str) -> bool {
 }
 
 /// `5k` is five thousand, where the key is no temperature.
-pub(super) fn magnified(number: &str, unit: &str, key: &str) -> Option<String> {
+pub(super) fn magnified(written: &str, key: &str) -> Option<String> {
+    let (number, unit) = split_unit(written)?;
+    // Behind a blank it is another unit.
+    let unit = unit.filter(|_| !written.contains(' '))?;
     let factor = match unit {
-        _ if key.ends_with("_k") || key.ends_with("kelvin") => return None,
+        // Kelvin, whatever the scale.
+        _ if ["_k", "_c", "kelvin"].iter().any(|it| key.ends_with(it)) => return None,
         "k" | "K" => 1e3,
         "M" => 1e6,
         _ => return None,

@@ -211,16 +211,14 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
 /// An error with the keys of a file in place of the method's own names.
 fn in_keys(error: &str) -> String {
     let said = error.strip_prefix("hall zero: ").unwrap_or(error);
-    let words = said.split(' ').map(|word| match word {
-        "vc" => "`level_below_peak_v`",
-        "vc0" => "`turn_below_peak_v`",
-        "delta1" => "`delta1_mv`",
-        "delta2" => "`delta2_mv`",
-        "delta3" => "`delta3_mv`",
-        "delta4" => "`delta4_mv`",
-        other => other,
+    let words = said.split_inclusive([' ', ',']).map(|word| {
+        let bare = word.trim_end_matches([' ', ',']);
+        match key_of_setting(bare) {
+            "" => word.to_owned(),
+            key => format!("`{key}`{}", &word[bare.len()..]),
+        }
     });
-    words.collect::<Vec<_>>().join(" ")
+    words.collect()
 }
 
 /// The key of the one setting that an error is about, if it is about one.
@@ -231,7 +229,12 @@ fn key_of(error: &SettingsError) -> &'static str {
         SettingsError::Order { small, .. } => small.split(' ').next().unwrap_or_default(),
         SettingsError::NominalOutside { .. } => "",
     };
+    key_of_setting(setting)
+}
+
+fn key_of_setting(setting: &str) -> &'static str {
     match setting {
+        "noise" => "noise_mv",
         "vc" => "level_below_peak_v",
         "vc0" => "turn_below_peak_v",
         "delta1" => "delta1_mv",

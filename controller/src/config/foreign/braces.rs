@@ -1,6 +1,6 @@
 //! Sections in braces, as in JSON, or in round brackets, as in Python.
 
-use super::{Entry, Node, Tree, is_name};
+use super::{DEPTH_MAX, Entry, Node, Tree, is_name};
 
 /// The section that begins on the first of `lines`; `None` where it is none, or does not end.
 pub(super) fn read(lines: &[&str]) -> Option<Tree> {
@@ -10,6 +10,10 @@ pub(super) fn read(lines: &[&str]) -> Option<Tree> {
     }
     let mut reader = Reader::default();
     for (at, line) in lines.iter().enumerate() {
+        // A section of this language begins: the bracket was a stray one.
+        if reader.lists == 0 && at > 0 && line.trim_start().starts_with('[') {
+            return None;
+        }
         reader.line(at, line)?;
         // An entry that begins a line at the outermost level is no part of a section in braces.
         if reader.open.is_empty() {
@@ -97,7 +101,10 @@ impl Reader {
             .said
             .trim_matches(['"', '\'', ' ', '\t', ':', '=', '>', '@']);
         // A section's name, and no text with a bracket in it.
-        if !name.is_empty() && !is_path(name) || self.open.is_empty() && self.root.is_some() {
+        if self.open.len() == DEPTH_MAX
+            || !name.is_empty() && !is_path(name)
+            || self.open.is_empty() && self.root.is_some()
+        {
             return None;
         }
         let name = name.to_owned();

@@ -1,6 +1,7 @@
 //! Sections that are told apart by how far their lines stand in, as in YAML.
 
-use super::{Entry, Node, Tree, is_name};
+use super::{DEPTH_MAX, Entry, Node, Tree, is_name};
+use crate::config::slips::comment_at;
 
 /// The section that begins on the first of `lines`; `None` where it is none.
 pub(super) fn read(lines: &[&str]) -> Option<Tree> {
@@ -10,7 +11,7 @@ pub(super) fn read(lines: &[&str]) -> Option<Tree> {
         name,
         ..Node::default()
     };
-    let last = fill(&mut root, lines, (1, count))?;
+    let last = fill(&mut root, lines, (1, count), 1)?;
     let is_meant = last == count && count > 1;
     is_meant.then_some(Tree {
         root,
@@ -39,7 +40,7 @@ fn depth(line: &str) -> usize {
 
 /// Without a comment behind it.
 fn said(line: &str) -> &str {
-    line.split(" #").next().unwrap_or_default().trim()
+    line[..comment_at(line)].trim()
 }
 
 /// `compensation` of `compensation:`.
@@ -49,7 +50,10 @@ fn named(line: &str) -> Option<String> {
 }
 
 /// Reads the lines from the first to before the last into `node`; gives where it stopped, as they stand less far in.
-fn fill(node: &mut Node, lines: &[&str], (from, to): (usize, usize)) -> Option<usize> {
+fn fill(node: &mut Node, lines: &[&str], (from, to): (usize, usize), deep: usize) -> Option<usize> {
+    if deep > DEPTH_MAX {
+        return None;
+    }
     let first = (from..to).find(|it| is_said(lines[*it]))?;
     let within = depth(lines[first]);
     let mut at = first;
@@ -63,7 +67,7 @@ fn fill(node: &mut Node, lines: &[&str], (from, to): (usize, usize)) -> Option<u
             return Some(at);
         }
         at = match named(line) {
-            Some(name) => inner(node, name, lines, (at, to))?,
+            Some(name) => inner(node, name, lines, (at, to), deep)?,
             None => {
                 let text = said(line).to_owned();
                 text.contains(':').then_some(())?;
@@ -76,7 +80,13 @@ fn fill(node: &mut Node, lines: &[&str], (from, to): (usize, usize)) -> Option<u
 }
 
 /// A section in this one, or a list with one entry a line.
-fn inner(node: &mut Node, name: String, lines: &[&str], (at, to): (usize, usize)) -> Option<usize> {
+fn inner(
+    node: &mut Node,
+    name: String,
+    lines: &[&str],
+    (at, to): (usize, usize),
+    deep: usize,
+) -> Option<usize> {
     let items = lines[at + 1..to].iter().map(|it| said(it));
     let items = items.map_while(|it| it.strip_prefix("- "));
     let items: Vec<&str> = items.collect();
@@ -90,7 +100,7 @@ fn inner(node: &mut Node, name: String, lines: &[&str], (at, to): (usize, usize)
         line: at,
         ..Node::default()
     };
-    let next = fill(&mut own, lines, (at + 1, to))?;
+    let next = fill(&mut own, lines, (at + 1, to), deep + 1)?;
     node.inner.push(own);
     Some(next)
 }

@@ -1,6 +1,6 @@
 //! Sections between tags, as in XML.
 
-use super::{Entry, Node, Tree, is_name};
+use super::{DEPTH_MAX, Entry, Node, Tree, is_name};
 use crate::config::slips::informed::element;
 
 /// The section that begins on the first of `lines`; `None` where it is none, or does not end.
@@ -13,7 +13,7 @@ pub(super) fn read(lines: &[&str]) -> Option<Tree> {
         let line = line.trim();
         if let Some(text) = element(line) {
             open.last_mut()?.entries.push(Entry { line: at, text });
-        } else if let Some(name) = begun(line) {
+        } else if let Some(name) = begun(line).filter(|_| open.len() < DEPTH_MAX) {
             open.push(Node {
                 name,
                 line: at,

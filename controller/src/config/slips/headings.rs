@@ -42,8 +42,21 @@ impl<'a> Heading<'a> {
         if inner.contains(OPEN) || is_remark || is_list {
             return None;
         }
-        let name = inner.split(CLOSED).next().unwrap_or_default();
-        let named = name.split(BETWEEN).map(|it| it.trim_matches(QUOTES));
+        // `axis->x` has an arrow, and no bracket, between its parts.
+        let is_arrow = inner.contains("->");
+        let name = match is_arrow {
+            true => inner.trim_end_matches(CLOSED),
+            false => inner.split(CLOSED).next().unwrap_or_default(),
+        };
+        let is_between = |it: char| BETWEEN.contains(&it) || is_arrow && it == '>';
+        let named = name.split(is_between).map(|it| it.trim_matches(QUOTES));
+        let named = named.map(|it| {
+            if is_arrow {
+                it.trim_end_matches('-')
+            } else {
+                it
+            }
+        });
         Some(Self {
             line,
             at: parts.said.len() - parts.said.trim_start().len(),
@@ -159,7 +172,9 @@ fn with_a_key(line: &str) -> Option<Slip> {
     let end = end + line[end..].len() - line[end..].trim_start_matches(']').len();
     let (heading, rest) = line.split_at(end);
     let key = rest.split_once('=')?.0.trim();
-    if !line.starts_with('[') || !is_toml(heading) || !super::is_key(key) {
+    // `[143]` is the number of a line.
+    let is_number = heading.trim_matches(['[', ']']).parse::<usize>().is_ok();
+    if !line.starts_with('[') || is_number || !is_toml(heading) || !super::is_key(key) {
         return None;
     }
     let cause = format!(

@@ -69,7 +69,7 @@ fn numbers(raw: &str, key: &str) -> Vec<String> {
     }
     let by_unit = split_unit(&bare).and_then(|(number, unit)| {
         let unit = unit?;
-        magnified(number, unit, key).or_else(|| converted(number, unit, key))
+        magnified(&bare, key).or_else(|| converted(number, unit, key))
     });
     // What follows a number may be a remark, or how sure it is; what looks like another number is part of it.
     let behind = rest[first.len()..].trim_start();

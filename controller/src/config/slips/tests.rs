@@ -126,7 +126,7 @@ fn keys_and_what_parts_them_from_values_say_how_they_are_written() {
         Some("name = \"linear\""),
     );
     check("node_id", "`node_id` has no value", "node_id = value", None);
-    check("node_id =", "no value behind", "`node_id`", None);
+    check("node_id =", "no value behind", "write a value", None);
     check("= 1", "no key before", "key = value", None);
     check(
         "window_µm = 1",

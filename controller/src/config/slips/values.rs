@@ -60,7 +60,7 @@ fn with_a_unit(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         "`{}` is no number: the unit is in the key's name",
         shown(value)
     );
-    if let Some(other) = magnified(number, unit, parts.key) {
+    if let Some(other) = magnified(value, parts.key) {
         let help = format!("write {other}");
         return parts.value_meant(&other, cause, help);
     }

@@ -16,9 +16,7 @@ const CALLED_BY: [(&str, &[&str]); 6] = [
 
 /// The only name of a section of `group` that is called and is not there.
 pub(super) fn missing(group: &str, document: &Table) -> Option<String> {
-    let (_, keys) = CALLED_BY.iter().find(|it| it.0 == group)?;
-    let mut called = Vec::new();
-    collect(document, keys, &mut called);
+    let mut called = called(group, document);
     let there = document.get(group).and_then(Value::as_table);
     called.retain(|it| there.is_none_or(|own| !own.get(it).is_some_and(Value::is_table)));
     called.sort_unstable();
@@ -27,6 +25,19 @@ pub(super) fn missing(group: &str, document: &Table) -> Option<String> {
         [one] => Some(one.clone()),
         _ => None,
     }
+}
+
+/// Whether a key calls a section of `group` by that name: the drive's bus, an axis' sensors.
+pub(super) fn is_called(group: &str, name: &str, document: &Table) -> bool {
+    called(group, document).iter().any(|it| it == name)
+}
+
+fn called(group: &str, document: &Table) -> Vec<String> {
+    let mut called = Vec::new();
+    if let Some((_, keys)) = CALLED_BY.iter().find(|it| it.0 == group) {
+        collect(document, keys, &mut called);
+    }
+    called
 }
 
 fn collect(table: &Table, keys: &[&str], called: &mut Vec<String>) {

@@ -10,7 +10,7 @@ use crate::config::lines::below;
 use crate::config::meant::word_meant;
 use crate::config::place::Part;
 use crate::config::repair::{Repair, join};
-use crate::config::schema::{DEVICE, type_of};
+use crate::config::schema::{DEVICE, type_of, without_null};
 
 pub(super) fn named(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) {
     let all_are_sections = type_of(own) == "object";
@@ -82,7 +82,14 @@ fn nameless(path: &str, whole: &mut Table, own: &Schema, found: &mut Found<'_>) 
 /// Whether `[axis.zero]` was written for `[axis.x.zero]`.
 fn is_part_of_one(name: &str, inner: &Table, own: &Schema) -> bool {
     let section = Section::of(own, inner);
-    let is_key = section.keys.contains_key(name) || section.is_of_another_device(name);
+    // `path` is a key of a bus, and may be the name of one as well.
+    let is_plain = |own: &Schema| {
+        ["number", "integer", "string", "boolean"].contains(&type_of(without_null(own)))
+    };
+    let is_key = match section.keys.get(name) {
+        Some(own) => !is_plain(own),
+        None => section.is_of_another_device(name),
+    };
     is_key && name != DEVICE && !inner.contains_key(DEVICE)
 }
 
@@ -134,7 +141,9 @@ fn with_strays(path: &str, seen: &Table, own: &Schema, found: &mut Found<'_>) ->
             of_another_group((path, name), parts, &mut whole, found);
             continue;
         };
-        if is_called(name, found.document) && !is_called(meant, found.document) {
+        if called::is_called(path, name, found.document)
+            && !called::is_called(path, meant, found.document)
+        {
             misnamed(path, (meant, name), &mut whole, found);
             continue;
         }
@@ -188,21 +197,6 @@ fn of_another_group(
     whole.remove(name);
     found.repairs.push(Repair::Remove { key: key.clone() });
     tell(found, key, cause, help);
-}
-
-/// Whether a value of the file names it: the drive's bus, an axis' sensors.
-fn is_called(name: &str, table: &Table) -> bool {
-    let mut values = table.values();
-    values.any(|it| match it {
-        Value::String(word) => word == name,
-        Value::Table(inner) => is_called(name, inner),
-        Value::Array(items) => items.iter().any(|it| match it {
-            Value::String(word) => word == name,
-            Value::Table(inner) => is_called(name, inner),
-            _ => false,
-        }),
-        _ => false,
-    })
 }
 
 /// Of a section that all the file calls otherwise, sections of it included, the name is wrong.

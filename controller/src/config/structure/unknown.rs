@@ -42,6 +42,9 @@ pub(super) fn merged(seen: &Table, section: &Section<'_>) -> Table {
     merged
 }
 
+/// Of a file with more findings nobody reads where each key would be at home, and looking takes long.
+const LOOKED_FOR_MAX: usize = 100;
+
 /// Says what is wrong with a key that the section does not have; gives that of `free` which was meant.
 pub(super) fn unknown<'a>(
     (path, name): (&str, &str),
@@ -57,6 +60,7 @@ pub(super) fn unknown<'a>(
         return None;
     }
     let (home, schema) = (found.home_of(name), found.schema);
+    let is_long = found.findings.len() > LOOKED_FOR_MAX;
     let mut tell = |cause: String, help: String, repair| {
         let key = key.clone();
         found.repairs.push(repair);
@@ -83,11 +87,14 @@ pub(super) fn unknown<'a>(
         to: to.to_owned(),
     };
     // A key of a section that is not there is no other one that was mistyped.
-    let lost = places::lost((schema, found.document), (path, name)).filter(|_| lacks.is_none());
+    let is_looked_for = lacks.is_none() && !is_long;
+    let lost = is_looked_for.then(|| places::lost((schema, found.document), (path, name)));
+    let lost = lost.flatten();
     let (help, repair, named) = match (section.part_meant(name, value), home.or(lost), meant) {
         (Some(part), _, _) => (format!("did you mean `{part}`?"), renamed(part), Some(part)),
         (None, Some(home), _) => (home, remove(), None),
         (None, None, Some(key)) => (advice(meant, free), renamed(key), Some(key)),
+        (None, None, None) if !is_looked_for => (advice(None, free), remove(), None),
         (None, None, None) => {
             let help = elsewhere((schema, found.document), (path, name), free);
             (help, remove(), None)
@@ -122,6 +129,7 @@ fn in_other_unit(
         found.converted.push(Converted {
             finding,
             key,
+            seen: number,
             value,
         });
     }

@@ -69,6 +69,11 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
     match (expected, value) {
         ("number" | "integer", Value::String(text)) => {
             match (in_other_unit(text, key), number_in(text)) {
+                (Some(number), _)
+                    if expected == "integer" && !number.ends_with(".0") && number.contains('.') =>
+                {
+                    format!("give {}", in_words(expected))
+                }
                 (Some(number), _) => {
                     let number = match expected {
                         "integer" => without_decimals(number),
@@ -130,8 +135,7 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
 fn in_other_unit(text: &str, key: &str) -> Option<String> {
     let (number, unit) = split_unit(text.trim())?;
     let unit = unit?;
-    let other =
-        unit::magnified(number, unit, key).or_else(|| unit::converted(number, unit, key))?;
+    let other = unit::magnified(text.trim(), key).or_else(|| unit::converted(number, unit, key))?;
     (other.parse() != number.parse::<f64>()).then_some(other)
 }
 

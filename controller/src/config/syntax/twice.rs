@@ -180,7 +180,7 @@ impl<'a> Place<'a> {
         let help = match is_section {
             true => match self.lacking(wanted) {
                 Some(other) => {
-                    format!("one of them was meant to be [{other}], which is missing: write that")
+                    format!("did you mean [{other}] by one of them? It is missing")
                 }
                 None => "leave one of them out".to_owned(),
             },
