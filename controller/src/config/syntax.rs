@@ -180,7 +180,7 @@ pub(super) fn recovered(text: &str, file: &str, schema: &Schema) -> Recovered {
             }
         }
     }
-    twice::take_out(&mut kept, file, &mut found);
+    twice::take_out(&mut kept, (file, schema), &mut found);
     found.text = kept.join("\n");
     found.findings.sort_by_key(|it| (it.line, it.column));
     abridge(&mut found.findings);

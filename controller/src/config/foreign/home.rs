@@ -53,15 +53,21 @@ fn by_keys(names: &[&str], keys: &[&str], around: &Around<'_>) -> Vec<String> {
     found.retain(|it| alike(it) == most);
     found
         .iter()
-        .filter_map(|it| with_a_name(it, around))
+        .filter_map(|it| with_a_name(it, names, around))
         .collect()
 }
 
 /// `axis.x.zero` of `axis.NAME.zero`: by the section that it stands in, or the only one that has none.
-fn with_a_name(path: &str, around: &Around<'_>) -> Option<String> {
+fn with_a_name(path: &str, names: &[&str], around: &Around<'_>) -> Option<String> {
     let Some((group, rest)) = path.split_once(".NAME") else {
         return Some(path.to_owned());
     };
+    // `can0` has the keys of a bus, and its name.
+    if let (true, [.., name]) = (rest.is_empty(), names)
+        && *name != group
+    {
+        return Some(below(group, name));
+    }
     let own = |it: &'_ str| -> Option<String> {
         let name = it
             .strip_prefix(group)?

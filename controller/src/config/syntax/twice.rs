@@ -2,14 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use serde_json::Value as Schema;
 use toml::de::DeTable;
 
 use super::{Recovered, TOLD_MAX, is_header, name_of};
 use crate::config::diagnostic::{Diagnostic, shown};
 use crate::config::lines::below;
+use crate::config::wanted::is_list;
 
 /// Tells each, and leaves it out of `lines`, each of which is TOML by itself.
-pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) {
+pub(super) fn take_out(
+    lines: &mut [String],
+    (file, schema): (&str, &Schema),
+    found: &mut Recovered,
+) {
     // Each round leaves out one line at least.
     for _ in 0..lines.len() {
         let text = lines.join("\n");
@@ -31,6 +37,11 @@ pub(super) fn take_out(lines: &mut [String], file: &str, found: &mut Recovered) 
         let (cause, help) = match is_again {
             true => again(&place),
             false => place.told(),
+        };
+        let name = name_of(place.line);
+        let help = match place.is_section() && is_list(schema, name) {
+            true => format!("write `[[{name}]]`: there can be several, each with two brackets"),
+            false => help,
         };
         found.contested.push(place.key());
         // Which of the two was meant to be the missing one nobody knows.
@@ -224,24 +235,28 @@ impl<'a> Place<'a> {
         let is_in =
             |inner: &str, outer: &str| inner == outer || inner.starts_with(&format!("{outer}."));
         let mut section = "";
+        let mut is_same = false;
         let first = self.before().position(|line| {
             if is_header(line) {
                 section = name_of(line);
                 return !is_section && section.len() > own.len() && is_in(&here, section);
             }
-            let Some((key, _)) = line.split_once('=') else {
+            let Some((key, value)) = line.split_once('=') else {
                 return false;
             };
             let key = below(section, key.trim());
+            is_same = here == key && value.trim().starts_with('{');
             is_section && (is_in(&here, &key) || is_in(&key, &here))
         })?;
         let [what, other] = match is_section {
             true => ["section", "key"],
             false => ["key", "section"],
         };
-        Some((
-            format!("it is a {what} here, and a {other} on line {}", first + 1),
-            format!("one of them has the wrong name: correct the {other} or the {what}"),
-        ))
+        let help = match is_same {
+            true => "leave one of them out".to_owned(),
+            false => format!("one of them has the wrong name: correct the {other} or the {what}"),
+        };
+        let cause = format!("it is a {what} here, and a {other} on line {}", first + 1);
+        Some((cause, help))
     }
 }
