@@ -163,7 +163,7 @@ fn values(document: &Table, key: &str) -> Vec<Value> {
             });
             // Decimal commas make two entries of each.
             let halved: Vec<Value> = items.iter().step_by(2).cloned().collect();
-            let halved = (items.len() % 2 == 0).then(|| Value::Array(halved));
+            let halved = (items.len() % 2 == 0).then_some(Value::Array(halved));
             halved.into_iter().chain(whole).collect()
         }
         own => others(own, &names),
