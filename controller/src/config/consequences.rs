@@ -90,7 +90,7 @@ pub(super) fn left_out(
 /// How often a document is judged at most: a long one less often, as each time takes longer.
 pub(super) fn budget(document: &Table) -> usize {
     const VALUES: usize = 150_000;
-    VALUES / count(&Value::Table(document.clone())).max(1)
+    VALUES / document.values().map(count).sum::<usize>().max(1)
 }
 
 fn count(value: &Value) -> usize {

@@ -10,7 +10,7 @@ use serde_json::Value as Schema;
 use super::diagnostic::shown;
 use super::lines::below;
 use super::slips::{informed, is_toml};
-use super::wanted::{Wanted, is_list};
+use super::wanted::{Wanted, heading};
 
 /// No section has more lines, nor sections in more sections.
 const LINES_MAX: usize = 200;
@@ -132,10 +132,7 @@ impl Foreign {
     fn add(&mut self, part: &Part<'_>, schema: &Schema) -> Option<String> {
         let mut written = Vec::new();
         if let Some(path) = &part.path {
-            let heading = match is_list(schema, path) {
-                true => format!("[[{path}]]"),
-                false => format!("[{path}]"),
-            };
+            let heading = heading(schema, path);
             self.put(part.line, &heading)?;
             let wanted = Wanted::at(schema, path);
             for entry in part.entries {

@@ -99,6 +99,13 @@ impl<'a> Judge<'a> {
     }
 }
 
+/// `findings` without those whose places among them are `told` by others.
+pub(super) fn without<T>(findings: Vec<T>, told: &[usize]) -> Vec<T> {
+    let each = findings.into_iter().enumerate();
+    let left = each.filter(|(at, _)| !told.contains(at));
+    left.map(|it| it.1).collect()
+}
+
 /// As a sentence begins.
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();

@@ -8,7 +8,7 @@ use super::lines::below;
 use super::place::Part;
 use super::repair::join;
 use super::structure::Findings;
-use super::wanted::{Wanted, is_list, section_meant};
+use super::wanted::{Wanted, heading, is_list, section_meant};
 
 /// So many sections under strange names are looked for at most.
 const STRANGE_MAX: usize = 25;
@@ -35,11 +35,7 @@ pub(super) fn relocated(mut document: Table, schema: &Schema) -> (Table, Finding
         if let Value::Table(nested) = nested {
             join(&mut document, nested);
         }
-        let path = meant.join(".");
-        let heading = match is_list(schema, &path) {
-            true => format!("[[{path}]]"),
-            false => format!("[{path}]"),
-        };
+        let heading = heading(schema, &meant.join("."));
         let finding = Finding {
             key: it.parts.join("."),
             cause: "no section has this name".to_owned(),

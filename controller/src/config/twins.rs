@@ -1,6 +1,7 @@
 //! A key that stands twice where another one is missing: one of the two was meant to be that.
 
 use super::diagnostic::Diagnostic;
+use super::judge::without;
 use super::meant::key_meant;
 
 /// `findings` with each such pair told as one.
@@ -34,10 +35,5 @@ pub(super) fn told(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
         gone.extend(missing.iter().filter(|it| it.1 == meant).map(|it| it.0));
         findings[at].help = help;
     }
-    let mut at = 0;
-    findings.retain(|_| {
-        at += 1;
-        !gone.contains(&(at - 1))
-    });
-    findings
+    without(findings, &gone)
 }

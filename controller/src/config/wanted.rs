@@ -144,6 +144,14 @@ pub(super) fn is_list(schema: &Schema, path: &str) -> bool {
     !is_one && ways.iter().any(|it| it["items"]["properties"].is_object())
 }
 
+/// The line that begins a section of that name.
+pub(super) fn heading(schema: &Schema, path: &str) -> String {
+    match is_list(schema, path) {
+        true => format!("[[{path}]]"),
+        false => format!("[{path}]"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,7 @@
 //! Keys that stand in one section and are missing in another: told once, where they stand.
 
 use super::Found;
+use crate::config::judge::without;
 
 /// Findings, by their place among all, with the key that each is about.
 #[derive(Debug, Default)]
@@ -39,11 +40,7 @@ pub(super) fn join(found: &mut Found<'_>) {
         found.findings[*at].0.help = format!("`{key}` is missing {place}: move it there");
         told.push(*missing);
     }
-    let mut at = 0;
-    found.findings.retain(|_| {
-        at += 1;
-        !told.contains(&(at - 1))
-    });
+    found.findings = without(core::mem::take(&mut found.findings), &told);
 }
 
 #[cfg(test)]
