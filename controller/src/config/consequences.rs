@@ -32,29 +32,31 @@ pub(super) fn left_out(
         return findings;
     }
     let mut left = budget(document);
-    let mut keys_with = |changes: Changes| {
+    let mut document = document.clone();
+    let mut keys_with = |document: &Table, changes: Changes| {
         left = left.checked_sub(1)?;
         let mut other = document.clone();
         for (key, value) in changes {
-            let own = value_at(&mut other, &key)?;
-            *own = match (&own, value) {
-                (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
-                // Of a list all are doubted.
-                (Value::Array(items), Value::Float(it)) => {
-                    Value::Array(items.iter().map(|_| Value::Float(it)).collect())
-                }
-                (_, value) => value,
-            };
+            set(&mut other, &key, value)?;
         }
         let found = found_in(&other)?;
         Some(found.into_iter().map(|it| it.key).collect::<BTreeSet<_>>())
     };
     for doubt in doubts {
+        let mut fewest = None;
         for value in &doubt.within {
-            let Some(found) = keys_with(vec![(doubt.key.clone(), Value::Float(*value))]) else {
+            let changes = vec![(doubt.key.clone(), Value::Float(*value))];
+            let Some(found) = keys_with(&document, changes) else {
                 continue;
             };
             findings.retain(|it| found.contains(&it.key));
+            if fewest.is_none_or(|(count, _)| found.len() < count) {
+                fewest = Some((found.len(), *value));
+            }
+        }
+        // What another value only brings about would hide what the others are because of.
+        if let Some((_, value)) = fewest {
+            set(&mut document, &doubt.key, Value::Float(value));
         }
     }
     if !(2..=FINDINGS_MAX).contains(&findings.len()) {
@@ -65,8 +67,8 @@ pub(super) fn left_out(
     let mut roots: BTreeSet<String> = BTreeSet::new();
     let mut most = BTreeSet::new();
     for root in &all {
-        for changes in trials(document, root) {
-            let Some(found) = keys_with(changes) else {
+        for changes in trials(&document, root) {
+            let Some(found) = keys_with(&document, changes) else {
                 continue;
             };
             // Another value that is wrong in another way says nothing.
@@ -85,6 +87,31 @@ pub(super) fn left_out(
     }
     findings.retain(|it| roots.contains(&it.key) || !most.contains(&it.key));
     findings
+}
+
+/// Gives a key that is there another value, of the type that it has.
+fn set(document: &mut Table, key: &str, value: Value) -> Option<()> {
+    let own = value_at(document, key)?;
+    *own = match (&own, value) {
+        (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
+        // Of a list all are doubted.
+        (Value::Array(items), Value::Float(it)) => {
+            Value::Array(items.iter().map(|_| Value::Float(it)).collect())
+        }
+        (_, value) => value,
+    };
+    Some(())
+}
+
+/// The document with a value that its key can have for each whole number that it cannot.
+pub(super) fn within(mut document: Table, doubts: &[Doubt]) -> Table {
+    for doubt in doubts {
+        let is_whole = matches!(value_at(&mut document, &doubt.key), Some(Value::Integer(_)));
+        if let (true, Some(value)) = (is_whole, doubt.within.first()) {
+            set(&mut document, &doubt.key, Value::Float(*value));
+        }
+    }
+    document
 }
 
 /// How often a document is judged at most: a long one less often, as each time takes longer.
@@ -242,6 +269,14 @@ mod tests {
             "axes = [\"y\", \"y\", \"z\"]",
         );
         check(&text, &["volumetric.axes"]);
+    }
+
+    #[test]
+    fn a_number_that_its_key_cannot_hold_hides_nothing() {
+        let text = LINEAR
+            .edit("rail_high_v = 4.9", "rail_high_v = -7.35")
+            .edit_first("node_id = 2", "node_id = 300");
+        check(&text, &["analog.hall.node_id", "axis.x.zero.rail_high_v"]);
     }
 
     #[test]

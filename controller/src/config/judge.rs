@@ -6,6 +6,7 @@ use units::Short;
 
 use super::diagnostic::shown;
 use super::meant::word_meant;
+use super::place::is_of_key;
 
 /// A tolerance so many times as large as the errors that are corrected is reached by any machine: its errors are larger
 /// before they are corrected, but hardly by so much.
@@ -74,29 +75,72 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// That a section of the kind `section` (`analog`, say) of this file is called `name`.
     pub(crate) fn known<T>(
         &mut self,
         key: &str,
         name: &str,
         table: &BTreeMap<String, T>,
-        kind: &str,
+        section: &str,
     ) {
-        if !table.contains_key(name) {
-            let names: Vec<&str> = table.keys().map(String::as_str).collect();
-            let known = match names.is_empty() {
-                true => "there is none yet: add a section for it".to_owned(),
-                false => format!("known: {}", names.join(", ")),
-            };
-            // `analog.hall` is how its section is called.
-            let (_, last) = name.rsplit_once('.').unwrap_or(("", name));
-            let own = names.iter().find(|it| **it == last).copied();
-            let help = match own.or_else(|| word_meant(name, &names)) {
-                Some(meant) => format!("did you mean `{meant}`? {}", capital(&known)),
-                None => known,
-            };
-            self.say(key, format!("there is no {kind} `{}`", shown(name)), help);
-        }
+        let heading = is_plain(name).then(|| format!("[{section}.{name}]"));
+        let add = heading.map_or("add a section for it".into(), |it| format!("add {it}"));
+        self.is_among((key, name), table, (said_of(section), Some(&add)));
     }
+
+    /// Likewise of another file, to which nothing can be added here.
+    pub(crate) fn known_to_machine<T>(
+        &mut self,
+        key: &str,
+        name: &str,
+        table: &BTreeMap<String, T>,
+        section: &str,
+    ) {
+        self.is_among((key, name), table, (said_of(section), None));
+    }
+
+    fn is_among<T>(
+        &mut self,
+        (key, name): (&str, &str),
+        table: &BTreeMap<String, T>,
+        (kind, add): (&str, Option<&str>),
+    ) {
+        if table.contains_key(name) {
+            return;
+        }
+        let names: Vec<&str> = table.keys().map(String::as_str).collect();
+        let known = match names.is_empty() {
+            true => "there is none yet".to_owned(),
+            false => format!("known: {}", names.join(", ")),
+        };
+        // `analog.hall` is how its section is called.
+        let (_, last) = name.rsplit_once('.').unwrap_or(("", name));
+        let own = names.iter().find(|it| **it == last).copied();
+        let meant = own.or_else(|| word_meant(name, &names));
+        let help = match (meant, add) {
+            (Some(meant), _) => format!("did you mean `{meant}`? {}", capital(&known)),
+            (None, Some(add)) if names.is_empty() => format!("{known}: {add}"),
+            (None, Some(add)) => format!("{known}; or {add}"),
+            (None, None) => known,
+        };
+        self.say(key, format!("there is no {kind} `{}`", shown(name)), help);
+    }
+}
+
+/// What the sections of a kind are, in words.
+fn said_of(section: &str) -> &str {
+    match section {
+        "analog" => "analog module",
+        "axis" => "linear axis",
+        "can" => "CAN bus",
+        "serial" => "serial line",
+        other => other,
+    }
+}
+
+/// Whether it can be the name of a section as it is.
+fn is_plain(name: &str) -> bool {
+    !name.is_empty() && name.len() <= 40 && name.chars().all(is_of_key)
 }
 
 /// `findings` without those whose places among them are `told` by others.

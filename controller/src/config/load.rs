@@ -14,7 +14,7 @@ use super::diagnostic::{ConfigError, Diagnostic};
 use super::lines;
 use super::model::MachineConfig;
 use super::other_units;
-use super::place::{Part, span_of};
+use super::place::{Part, Places};
 use super::relocated::relocated;
 use super::repair::{Repair, repaired};
 use super::schema;
@@ -189,6 +189,14 @@ fn read_by<C: DeserializeOwned>(
     findings.extend(regrouped);
     let document = repaired(document, &repairs);
     let config = Value::Table(document.clone()).try_into::<C>();
+    let (config, document) = match config {
+        // A number that its key cannot hold (`node_id = 300`) would hide what else is wrong.
+        Err(_) if !doubts.is_empty() => {
+            let document = consequences::within(document, &doubts);
+            (Value::Table(document.clone()).try_into::<C>(), document)
+        }
+        config => (config, document),
+    };
     let is_sound = findings.is_empty() && recovered.findings.is_empty();
     let config = match config {
         Ok(config) => Some(config),
@@ -301,8 +309,9 @@ fn placed(
     file: &str,
     findings: impl Iterator<Item = (Finding, Part)>,
 ) -> Vec<Diagnostic> {
+    let places = Places::of(text);
     let placed = findings.map(|(it, part)| {
-        let span = span_of(text, &it.key, part).unwrap_or(0..0);
+        let span = places.span_of(&it.key, part).unwrap_or(0..0);
         Diagnostic::at(file, text, &span, &it.key, it.cause, it.help)
     });
     let mut placed: Vec<_> = placed.collect();

@@ -1,7 +1,13 @@
-//! Where a key stands in the file.
+//! Where a key stands in the file, and what a key is made of.
 
 use core::ops::Range;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// Whether a key without quotation marks can have that letter (TOML v1.0, keys).
+pub(crate) fn is_of_key(it: char) -> bool {
+    it.is_ascii_alphanumeric() || "_-".contains(it)
+}
 
 /// What is wrong with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,11 +20,22 @@ pub(super) enum Part {
     Size,
 }
 
-/// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it
-/// is absent.
-pub(super) fn span_of(text: &str, key: &str, part: Part) -> Option<Range<usize>> {
-    let document = DeTable::parse(text).ok()?;
-    let mut table = document.get_ref();
+/// The places of a file's keys; none in one that cannot be read.
+pub(super) struct Places<'a>(Option<Spanned<DeTable<'a>>>);
+
+impl<'a> Places<'a> {
+    /// Those of `text`: looked up often, and read once.
+    pub(super) fn of(text: &'a str) -> Self {
+        Self(DeTable::parse(text).ok())
+    }
+
+    /// Where that part of a dotted key stands, of a section its name; the deepest table on the way when it is absent.
+    pub(super) fn span_of(&self, key: &str, part: Part) -> Option<Range<usize>> {
+        span_in(self.0.as_ref()?.get_ref(), key, part)
+    }
+}
+
+fn span_in(mut table: &DeTable<'_>, key: &str, part: Part) -> Option<Range<usize>> {
     let mut span = None;
     // `actuator[0]` is `actuator.0`.
     let mut parts = key.split(['.', '[', ']']).filter(|it| !it.is_empty());

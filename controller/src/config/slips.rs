@@ -9,6 +9,7 @@ mod values;
 use toml::Table;
 
 use super::diagnostic::shown;
+use super::place::is_of_key;
 
 /// What is said of a line.
 #[derive(Debug)]
@@ -273,8 +274,7 @@ fn two_keys(parts: &Parts<'_>) -> Option<Slip> {
 }
 
 fn is_key(text: &str) -> bool {
-    let is_letter = |it: char| it.is_ascii_alphanumeric() || "_-".contains(it);
-    !text.is_empty() && text.chars().all(is_letter)
+    !text.is_empty() && text.chars().all(is_of_key)
 }
 
 /// What stands between a key and its value, or one of these is missing.

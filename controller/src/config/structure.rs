@@ -20,7 +20,7 @@ use super::diagnostic::shown;
 use super::judge::Finding;
 use super::lines::below;
 use super::meant::word_meant;
-use super::place::{Part, span_of};
+use super::place::{Part, Places};
 use super::repair::Repair;
 use super::schema::{DEVICE, type_of, without_null};
 use moved::Moved;
@@ -69,6 +69,7 @@ pub(super) struct Found<'a> {
     document: &'a Table,
     /// The file as it stands.
     text: &'a str,
+    places: Places<'a>,
     /// Whether keys stand in a section that lacks its name: what is missing may be theirs.
     pub(super) has_nameless: bool,
     /// Sections that stand elsewhere, and are told there.
@@ -79,7 +80,25 @@ pub(super) struct Found<'a> {
     above: Vec<(String, Vec<String>)>,
 }
 
-impl Found<'_> {
+impl<'a> Found<'a> {
+    fn of((document, text): (&'a Table, &'a str), schema: &'a Schema, unread: Unread<'a>) -> Self {
+        Self {
+            findings: Vec::new(),
+            repairs: Vec::new(),
+            converted: Vec::new(),
+            doubts: Vec::new(),
+            unread,
+            schema,
+            document,
+            text,
+            places: Places::of(text),
+            has_nameless: false,
+            told: Vec::new(),
+            moved: Moved::default(),
+            above: Vec::new(),
+        }
+    }
+
     fn replace(&mut self, key: &str, value: Option<Value>) {
         let key = key.to_owned();
         self.repairs
@@ -88,7 +107,7 @@ impl Found<'_> {
 
     /// Where that part of a key stands.
     fn written(&self, key: &str, part: Part) -> Option<Range<usize>> {
-        span_of(self.text, key, part)
+        self.places.span_of(key, part)
     }
 
     /// A value as it stands in the file.
@@ -118,20 +137,7 @@ pub(super) fn judge<'a>(
     schema: &'a Schema,
     unread: Unread<'a>,
 ) -> Found<'a> {
-    let mut found = Found {
-        findings: Vec::new(),
-        repairs: Vec::new(),
-        converted: Vec::new(),
-        doubts: Vec::new(),
-        unread,
-        schema,
-        document,
-        text,
-        has_nameless: false,
-        told: Vec::new(),
-        moved: Moved::default(),
-        above: Vec::new(),
-    };
+    let mut found = Found::of((document, text), schema, unread);
     table("", document, schema, &mut found);
     moved::join(&mut found);
     found
@@ -140,20 +146,7 @@ pub(super) fn judge<'a>(
 /// Whether a value can be what `schema` says.
 pub(super) fn takes(schema: &Schema, value: &Value) -> bool {
     let document = Table::new();
-    let mut found = Found {
-        findings: Vec::new(),
-        repairs: Vec::new(),
-        converted: Vec::new(),
-        doubts: Vec::new(),
-        unread: Unread::default(),
-        schema,
-        document: &document,
-        text: "",
-        has_nameless: false,
-        told: Vec::new(),
-        moved: Moved::default(),
-        above: Vec::new(),
-    };
+    let mut found = Found::of((&document, ""), schema, Unread::default());
     any("", value, schema, &mut found);
     found.findings.is_empty()
 }

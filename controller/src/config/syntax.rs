@@ -11,6 +11,7 @@ use toml::de::DeTable;
 use super::diagnostic::{Diagnostic, shown};
 use super::foreign::{self, Around, Foreign};
 use super::lines::below;
+use super::place::is_of_key;
 use super::slips::{self, End, Slip, goes_on, headings, informed, is_toml};
 use super::wanted::Wanted;
 
@@ -215,9 +216,8 @@ fn extent(lines: &[&str]) -> usize {
 
 /// Whether a key stands at the beginning of the line.
 fn begins(line: &str) -> bool {
-    let is_letter = |it: char| it.is_ascii_alphanumeric() || "_-".contains(it);
     let key = line.split_once('=').map(|it| it.0.trim());
-    key.is_some_and(|it| !it.is_empty() && it.chars().all(is_letter))
+    key.is_some_and(|it| !it.is_empty() && it.chars().all(is_of_key))
 }
 
 /// What is wrong with a line, or with what goes on over `count` lines.

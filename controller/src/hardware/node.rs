@@ -167,7 +167,7 @@ pub(crate) fn check_node(
     bus: &str,
     [producer, consumer, watch_master]: [u16; 3],
 ) {
-    judge.known("bus", bus, can, "CAN bus");
+    judge.known("bus", bus, can, "can");
     check_heartbeat(judge, producer, consumer);
     check_watch(judge, can, bus, watch_master);
 }

@@ -141,7 +141,7 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig, 
     check_zero_place(judge, axis, zero);
     check_zero_search(judge, axis, zero);
     check_rails(judge, config, zero);
-    judge.known("analog", &zero.analog, &config.analog, "analog module");
+    judge.known("analog", &zero.analog, &config.analog, "analog");
     if let Some(analog) = config.analog.get(&zero.analog)
         && analog.channels.len() != 2
     {

@@ -4,6 +4,7 @@ use serde_json::Value as Schema;
 
 use super::{Parts, Slip, is_toml};
 use crate::config::diagnostic::shown;
+use crate::config::place::is_of_key;
 use crate::config::wanted::{is_list, section_meant};
 
 const OPEN: [char; 4] = ['[', '(', '{', '<'];
@@ -70,7 +71,7 @@ impl<'a> Heading<'a> {
             true => format!("[[{name}]]"),
             false => format!("[{name}]"),
         };
-        let is_name = |it: char| it.is_ascii_alphanumeric() || "_-.".contains(it);
+        let is_name = |it: char| is_of_key(it) || it == '.';
         if name.is_empty() || !name.chars().all(is_name) || !is_toml(&meant) {
             return None;
         }

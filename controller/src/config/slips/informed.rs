@@ -6,6 +6,7 @@ use toml::Table;
 use super::{Parts, Slip, is_key, is_toml, loosely, nothing_known};
 use crate::config::diagnostic::shown;
 use crate::config::meant::key_meant;
+use crate::config::place::is_of_key;
 use crate::config::unit::is_known;
 use crate::config::wanted::Wanted;
 
@@ -334,10 +335,6 @@ fn by_key(parts: &Parts<'_>, wanted: &Wanted<'_>) -> Option<Slip> {
     let help = format!("write `{key} = {}`", shown(&value));
     let meant = format!("{key} = {value} {}", parts.comment);
     Some(Slip::new(0, cause, help, Some(meant)))
-}
-
-fn is_of_key(it: char) -> bool {
-    it.is_ascii_alphanumeric() || "_-".contains(it)
 }
 
 /// A word that is no key of the section is none that wants a value; one that is cut short may be a longer one.

@@ -11,6 +11,7 @@ use self::bus::{check_bus, check_serial};
 use self::drive::check_axis_name;
 pub(super) use crate::config::judge::Finding;
 use crate::config::judge::Judge;
+use crate::config::place::is_of_key;
 use crate::kinds::KINDS;
 use drivers::device::cia402::period_from;
 use drivers::protocol::bus_load::BusLoadError;
@@ -82,8 +83,7 @@ pub(super) fn validate(config: &MachineConfig) -> Vec<Finding> {
 
 fn check_name(judge: &mut Judge<'_>, config: &MachineConfig) {
     let name = &config.machine.name;
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if name.is_empty() || !name.chars().all(plain) {
+    if name.is_empty() || !name.chars().all(is_of_key) {
         judge.say(
             "name",
             format!("`{name}` cannot name a folder"),

@@ -70,7 +70,7 @@ impl Family for DconConfig {
     }
 
     fn check(&self, judge: &mut Judge<'_>, inputs: &AnalogConfig, wiring: Wiring<'_>) {
-        judge.known("line", &self.line, wiring.serial, "serial line");
+        judge.known("line", &self.line, wiring.serial, "serial");
         if inputs.channels.iter().any(|channel| *channel >= 8) {
             judge.say("channels", "a dcon module has channels 0 to 7", "use those");
         }

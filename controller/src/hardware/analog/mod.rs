@@ -25,7 +25,7 @@ pub(crate) fn check_input(
     modules: &BTreeMap<String, AnalogConfig>,
     (module, channel): (&str, u8),
 ) {
-    judge.known("analog", module, modules, "analog module");
+    judge.known("analog", module, modules, "analog");
     if let Some(analog) = modules.get(module)
         && !analog.channels.contains(&channel)
     {

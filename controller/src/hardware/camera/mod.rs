@@ -107,7 +107,7 @@ impl CameraConfig {
 
     /// Judges what its keys must keep to together.
     pub(crate) fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
-        judge.known("line", &self.line, wiring.serial, "serial line");
+        judge.known("line", &self.line, wiring.serial, "serial");
         self.device.family().check(judge);
     }
 

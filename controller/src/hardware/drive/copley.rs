@@ -129,7 +129,7 @@ impl Family for CopleyAxisConfig {
             );
         }
         let name = &self.line;
-        judge.known("line", name, wiring.serial, "serial line");
+        judge.known("line", name, wiring.serial, "serial");
     }
 
     fn driver(&self, task: Task<'_>, wiring: Wiring<'_>, patience: Patience) -> Box<dyn Axis> {

@@ -170,7 +170,7 @@ pub struct InstrumentConfig {
 impl InstrumentConfig {
     /// Judges what its keys must keep to together.
     pub(crate) fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
-        judge.known("line", &self.line, wiring.serial, "serial line");
+        judge.known("line", &self.line, wiring.serial, "serial");
         self.device
             .family()
             .check(judge, wiring.serial.get(&self.line));

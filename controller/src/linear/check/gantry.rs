@@ -68,7 +68,7 @@ fn check_sides(judge: &mut Judge<'_>, config: &MachineConfig, gantry: &GantryCon
                 format!("remove axis.{axis}.kept_zero: both sides are zeroed together, after each start"),
             );
         }
-        judge.known("axes", axis, &config.axis, "linear axis");
+        judge.known("axes", axis, &config.axis, "axis");
         if config.axis.get(axis).is_some_and(|it| it.zero.is_none()) {
             judge.say(
                 "axes",

@@ -63,7 +63,7 @@ fn axis_of<'a>(
     findings: &mut Vec<Finding>,
 ) -> Option<&'a AxisConfig> {
     let mut judge = Judge::at(String::new(), findings);
-    judge.known("axis", &job.axis, &config.axis, "linear axis");
+    judge.known_to_machine("axis", &job.axis, &config.axis, "axis");
     let axis = config.axis.get(&job.axis)?;
     let whole = [
         (config.platform.is_some(), "a platform"),
@@ -175,7 +175,7 @@ fn judge_input(
             "which channel?",
             format!("give `channel`: {}", channels_of(analog)),
         ),
-        (None, None) => judge.known("analog", module, &config.analog, "analog module"),
+        (None, None) => judge.known_to_machine("analog", module, &config.analog, "analog"),
     }
     let levels: Vec<f64> = [go_on.above_v, go_on.below_v]
         .into_iter()

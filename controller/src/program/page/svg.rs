@@ -104,11 +104,30 @@ pub(crate) fn step(range: f64, wanted: f64) -> f64 {
     factor * power
 }
 
+/// The step of an axis that is called `label`, with its unit in brackets: a turn is parted as a circle is, and what
+/// has no unit is counted.
+fn step_of(label: &str, range: f64, wanted: f64) -> f64 {
+    let step = step(range, wanted);
+    if !label.ends_with(')') {
+        return step.max(1.0);
+    }
+    // Below ten degrees they are parted as all other numbers are.
+    let parts_of_turn = [15.0, 30.0, 45.0, 90.0, 180.0];
+    let of_turn = || parts_of_turn.into_iter().find(|it| it * wanted >= range);
+    match of_turn() {
+        Some(part) if label.ends_with("(°)") && step >= 10.0 => part,
+        _ => step,
+    }
+}
+
 /// Ticks of an axis at most: rounding makes no more of those that are wanted.
 pub(crate) const TICKS_MAX: usize = 100;
 
 pub(crate) fn ticks(range: (f64, f64), wanted: f64) -> Vec<f64> {
-    let step = step(range.1 - range.0, wanted);
+    ticks_by(step(range.1 - range.0, wanted), range)
+}
+
+fn ticks_by(step: f64, range: (f64, f64)) -> Vec<f64> {
     if !(step > 0.0 && step.is_finite()) {
         return Vec::new();
     }
@@ -152,8 +171,8 @@ pub(crate) fn grid(axes: &Axes, (x_label, y_label): (&str, &str)) -> String {
             "<text x=\"{x}\" y=\"{y_text:.1}\" text-anchor=\"end\">{text}</text>"
         );
     }
-    let x_step = step(axes.x.1 - axes.x.0, 10.0);
-    for x in ticks(axes.x, 10.0) {
+    let x_step = step_of(x_label, axes.x.1 - axes.x.0, 10.0);
+    for x in ticks_by(x_step, axes.x) {
         let (px, y, text) = (axes.px(x), bottom + 18.0, label(x, x_step));
         let _ = write!(
             svg,
@@ -179,6 +198,15 @@ mod tests {
         assert_eq!(ticks((0.0, 1.0), 5.0).len(), 6);
         assert_eq!(label(0.5, 0.5), "0.5");
         assert_eq!(label(20.0, 10.0), "20");
+    }
+
+    #[test]
+    fn a_turn_is_parted_as_a_circle_is_and_what_is_counted_is_whole() {
+        assert_eq!(step_of("table angle (°)", 359.0, 10.0), 45.0);
+        assert_eq!(step_of("table angle (°)", 120.0, 10.0), 15.0);
+        assert_eq!(step_of("table angle (°)", 4.0, 10.0), 0.5);
+        assert_eq!(step_of("run", 4.2, 10.0), 1.0);
+        assert_eq!(step_of("target (mm)", 4.2, 10.0), 0.5);
     }
 
     #[test]

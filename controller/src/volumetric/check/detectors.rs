@@ -295,7 +295,7 @@ fn module<'a>(
     config: &'a MachineConfig,
     name: &str,
 ) -> Option<&'a AnalogConfig> {
-    judge.known("analog", name, &config.analog, "analog module");
+    judge.known("analog", name, &config.analog, "analog");
     let analog = config.analog.get(name)?;
     if analog.every_syncs().is_some() {
         return Some(analog);

@@ -8,11 +8,15 @@ use units::Metres;
 use super::Section;
 use crate::linear::CriterionEntry;
 
-/// A row for each target; `criterion` says how uncertain the corrected position is.
+/// A row for each target; `criterion` says how uncertain the corrected position is, which only a verification states.
 pub(super) fn html(section: &Section<'_>) -> String {
-    let mut html = String::from(
+    let uncertain = match section.criterion {
+        Some(_) => "<th>U ↑, k = 2 (µm)</th><th>U ↓, k = 2 (µm)</th>",
+        None => "",
+    };
+    let mut html = format!(
         "<table><tr><th>target (mm)</th><th>mean ↑ (µm)</th><th>mean ↓ (µm)</th><th>s ↑ (µm)</th>\
-         <th>s ↓ (µm)</th><th>B (µm)</th><th>R (µm)</th><th>U ↑, k = 2 (µm)</th><th>U ↓, k = 2 (µm)</th></tr>",
+         <th>s ↓ (µm)</th><th>B (µm)</th><th>R (µm)</th>{uncertain}</tr>",
     );
     for it in &section.figures.targets {
         let _ = write!(html, "<tr><td>{:.3}</td>", it.target.mm());
@@ -27,15 +31,18 @@ pub(super) fn html(section: &Section<'_>) -> String {
         for figure in figures {
             let _ = write!(html, "<td>{:.3}</td>", figure.um());
         }
-        let [up, down] = expanded(section.criterion, it.target);
-        let _ = write!(html, "<td>{up}</td><td>{down}</td></tr>");
+        if let Some(criterion) = section.criterion {
+            let [up, down] = expanded(criterion, it.target);
+            let _ = write!(html, "<td>{up}</td><td>{down}</td>");
+        }
+        html += "</tr>";
     }
     html + "</table>"
 }
 
 /// The expanded uncertainty at a target, approached from either side.
-fn expanded(criterion: Option<&CriterionEntry>, target: Metres) -> [String; 2] {
-    let mut targets = criterion.iter().flat_map(|it| &it.targets);
+fn expanded(criterion: &CriterionEntry, target: Metres) -> [String; 2] {
+    let mut targets = criterion.targets.iter();
     let own = targets.find(|it| it.position_m == target.value());
     let sides = own.map_or([None, None], |it| [it.forward, it.reverse]);
     sides.map(|it| {

@@ -10,15 +10,14 @@ use crate::rotary::RotaryContent;
 /// So many of those that are more than noise are in the table: the largest.
 const LISTED: usize = 12;
 
-/// All as a picture, the largest with their uncertainty, and up to where they hold.
+/// All as a picture, the largest with their uncertainty; up to where they hold is said above.
 pub(super) fn html(content: &RotaryContent) -> String {
     let all = content.harmonics();
     let significant = all.iter().filter(|it| it.is_significant).count();
     format!(
-        "<h3>Harmonics</h3><p>{significant} of {} are larger than noise makes any of them in one of {TABLES_PER_FALSE_HARMONIC:.0} tables. The table error {}.</p>\
+        "<h3>Harmonics</h3><p>{significant} of {} are larger than noise makes any of them in one of {TABLES_PER_FALSE_HARMONIC:.0} tables.</p>\
          <figure>{}</figure>{}",
         all.len(),
-        content.harmonics_told(),
         picture(&all),
         table(all)
     )

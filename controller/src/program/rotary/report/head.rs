@@ -89,10 +89,11 @@ fn plate(plan: &PlatePlanEntry) -> [Fact; 3] {
         }
         Some(SightedAt::Line) => ", by a person, with each line under the cross-hair".to_owned(),
     };
-    let read = format!(
-        "{} pass(es) in each direction{how}, the first repeated at the end",
-        plan.passes
-    );
+    let passes = match plan.passes {
+        1 => "1 pass".to_owned(),
+        several => format!("{several} passes"),
+    };
+    let read = format!("{passes} in each direction{how}, the first repeated at the end");
     [
         Fact::new("plate", format!("{}, {} lines", plan.plate, plan.lines)),
         Fact::new("placements", format!("at {} lines", offsets.join(", "))),
