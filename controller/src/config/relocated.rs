@@ -89,7 +89,7 @@ fn is_section(value: &Value) -> bool {
 impl Named {
     /// The only place that has all its keys and a name that is made of the same parts, or of all but one of them.
     fn meant(&self, document: &Table, schema: &Schema) -> Option<Name> {
-        let is_mistyped = self.is_mistyped(schema);
+        let is_mistyped = self.is_mistyped(document, schema);
         /// A part of a section that is there is known by one key.
         const LENGTHENED: usize = 3;
         let ways: [Way; 5] = [
@@ -131,14 +131,17 @@ impl Named {
         strange < self.keys.len().min(2)
     }
 
-    /// Whether its name is like another one: that is told where each part is judged.
-    fn is_mistyped(&self, schema: &Schema) -> bool {
+    /// Whether its name is like that of one that is not there: that is told where each part is judged.
+    fn is_mistyped(&self, document: &Table, schema: &Schema) -> bool {
         let parts: Vec<&str> = self.parts.iter().map(String::as_str).collect();
         let meant = section_meant(schema, &parts);
         meant.is_some_and(|it| {
             let parts: Name = it.split('.').map(str::to_owned).collect();
             let wanted = keys_of(schema, &parts);
-            it != self.parts.join(".") && self.keys.iter().any(|key| wanted.has(key))
+            let there = at(document, &parts).and_then(Value::as_table);
+            let is_free =
+                there.is_none_or(|own| !self.keys.iter().any(|key| own.contains_key(key)));
+            it != self.parts.join(".") && is_free && self.keys.iter().any(|key| wanted.has(key))
         })
     }
 
@@ -320,6 +323,7 @@ mod tests {
             ("[axis.x]", "[achse.x]"),
             ("[analog.hall.identity]", "[adc.hall.identity]"),
             ("[axis.x.compensation]", "[axis.x.correction]"),
+            ("[axis.x.verify]", "[axis.x.calibrate2]"),
         ] {
             let text = LINEAR.edit(&format!("{right}\n"), &format!("{wrong}\n"));
             let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {

@@ -362,7 +362,12 @@ mod tests {
     fn axes_and_volume_that_cannot_be_are_found_where_they_stand() {
         let axes = "axes = [\"x\", \"y\", \"z\"]";
         check(axes, "axes = [\"x\", \"x\", \"z\"]", ".axes", "twice");
-        check(axes, "axes = [\"x\", \"y\", \"w\"]", ".axes", "no linear axis `w`");
+        check(
+            axes,
+            "axes = [\"x\", \"y\", \"w\"]",
+            ".axes",
+            "no linear axis `w`",
+        );
         let cyclic = "[axis.x.cyclic]\njerk_mm_per_s3 = 20000.0\ndeviation_limit_um = 500.0\n\
                       correction_limit_um = 300.0\ncorrection_rate_um_per_s = 2000.0\n";
         check(cyclic, "", ".axes", "does not follow cyclic");

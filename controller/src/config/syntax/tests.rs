@@ -62,6 +62,18 @@ fn what_stands_there_twice_is_named_with_both_places() {
 }
 
 #[test]
+fn a_section_that_is_there_twice_may_be_that_of_another_name_which_has_only_parts() {
+    const UVW: &str = include_str!("../../../../configs/machines/uvw.toml");
+    let text = UVW.edit("[axis.v]\n", "[axis.u]\n");
+    let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+        panic!("it stands there twice")
+    };
+    let help = "did you mean [axis.v] by one of them? It is missing";
+    assert!(findings.iter().any(|it| it.help == help), "{findings:#?}");
+    assert_eq!(findings.len(), 1, "{findings:#?}");
+}
+
+#[test]
 fn a_key_that_is_called_like_a_section_is_named_with_both_places() {
     let header = LINEAR.lines().position(|it| it == "[axis.x]");
     let header = header.expect("it is there") + 1;

@@ -44,9 +44,10 @@ pub(super) fn take_out(
             false => help,
         };
         found.contested.push(place.key());
+        let lacking = place.is_section().then(|| place.lacking(name));
+        let lacking = lacking.flatten();
         // Which of the two was meant to be the missing one nobody knows.
-        let is_lacking = place.is_section() && place.lacking(name_of(place.line)).is_some();
-        found.has_lost_heading |= is_lacking;
+        found.has_lost_heading |= lacking.is_some();
         found.findings.push(Diagnostic {
             file: file.to_owned(),
             line: number + 1,
@@ -56,7 +57,11 @@ pub(super) fn take_out(
             help,
         });
         let is_section = place.is_section();
-        leave_out(lines, number, is_section || is_again);
+        match lacking {
+            // Its keys are judged there, whichever it is.
+            Some(other) => lines[number] = format!("[{other}]"),
+            None => leave_out(lines, number, is_section || is_again),
+        }
         // A file with more of them was pasted together: what follows would take long, and say nothing new.
         if found.findings.len() > TOLD_MAX {
             lines[number..].iter_mut().for_each(String::clear);
@@ -203,10 +208,10 @@ impl<'a> Place<'a> {
         Some((cause, help))
     }
 
-    /// `axis.y.zero` where `axis.x.zero` stands twice, and only `y` has none.
+    /// `axis.y.zero` where `axis.x.zero` stands twice, and only `y` has none; `axis.y` where that has only sections.
     fn lacking(&self, section: &str) -> Option<String> {
         let (group, rest) = section.split_once('.')?;
-        let (_, part) = rest.split_once('.')?;
+        let part = rest.split_once('.').map_or("", |it| it.1);
         let headers = self
             .lines
             .iter()
@@ -222,7 +227,8 @@ impl<'a> Place<'a> {
         }
         let mut lacking = each.into_iter().filter(|it| !it.1).map(|it| it.0);
         match (lacking.next(), lacking.next()) {
-            (Some(one), None) => Some(format!("{group}.{one}.{part}")),
+            (Some(one), None) if part.is_empty() => Some(below(group, one)),
+            (Some(one), None) => Some(below(&below(group, one), part)),
             _ => None,
         }
     }
