@@ -89,14 +89,22 @@ pub(super) fn left_out(
     findings
 }
 
+/// A number as `own` is one: whole or not.
+fn like(own: &Value, number: f64) -> Value {
+    match own {
+        Value::Integer(_) => Value::Integer(number as i64),
+        _ => Value::Float(number),
+    }
+}
+
 /// Gives a key that is there another value, of the type that it has.
 fn set(document: &mut Table, key: &str, value: Value) -> Option<()> {
     let own = value_at(document, key)?;
     *own = match (&own, value) {
-        (Value::Integer(_), Value::Float(it)) => Value::Integer(it as i64),
+        (Value::Integer(_), Value::Float(it)) => like(own, it),
         // Of a list all are doubted.
         (Value::Array(items), Value::Float(it)) => {
-            Value::Array(items.iter().map(|_| Value::Float(it)).collect())
+            Value::Array(items.iter().map(|own| like(own, it)).collect())
         }
         (_, value) => value,
     };

@@ -1,9 +1,10 @@
-//! A section that stands over several lines as another language writes it: JSON, Python, YAML or XML.
+//! A section that stands over several lines as another language writes it: JSON, Python, YAML or XML; or in two versions.
 
 mod braces;
 mod home;
 mod indents;
 mod tags;
+mod versions;
 
 use serde_json::Value as Schema;
 
@@ -79,6 +80,9 @@ pub(super) struct Foreign {
 /// What begins on the first of `lines`, if it is a section of another language that ends.
 pub(super) fn of(lines: &[&str], around: &Around<'_>) -> Option<Foreign> {
     let lines = &lines[..lines.len().min(LINES_MAX)];
+    if let Some(versions) = versions::read(lines, around.section) {
+        return Some(versions);
+    }
     let tree = braces::read(lines)
         .or_else(|| tags::read(lines))
         .or_else(|| indents::read(lines))?;

@@ -34,16 +34,37 @@ impl<'a> Judge<'a> {
     }
 
     pub(crate) fn say(&mut self, key: &str, cause: impl Into<String>, help: impl Into<String>) {
-        let key = match (self.prefix.as_str(), key) {
-            (prefix, "") => prefix.to_owned(),
-            ("", key) => key.to_owned(),
-            (prefix, key) => format!("{prefix}.{key}"),
-        };
+        let key = self.path(key);
         self.findings.push(Finding {
             key,
             cause: cause.into(),
             help: help.into(),
         });
+    }
+
+    /// Where several have it in common, the first of them tells it.
+    pub(crate) fn say_once(
+        &mut self,
+        key: &str,
+        cause: impl Into<String>,
+        help: impl Into<String>,
+    ) {
+        let key = self.path(key);
+        if !self.findings.iter().any(|it| it.key == key) {
+            self.findings.push(Finding {
+                key,
+                cause: cause.into(),
+                help: help.into(),
+            });
+        }
+    }
+
+    fn path(&self, key: &str) -> String {
+        match (self.prefix.as_str(), key) {
+            (prefix, "") => prefix.to_owned(),
+            ("", key) => key.to_owned(),
+            (prefix, key) => format!("{prefix}.{key}"),
+        }
     }
 
     pub(crate) fn within(&mut self, key: &str, value: f64, low: f64, high: f64) {
@@ -53,6 +74,21 @@ impl<'a> Judge<'a> {
                 format!("{} is impossible", Short(value)),
                 format!("give {} to {}", Short(low), Short(high)),
             );
+        }
+    }
+
+    /// More than nothing, and no more than `most`, which is what the words `limit` say.
+    pub(crate) fn up_to(&mut self, key: &str, value: f64, (most, limit): (f64, &str)) {
+        if !(value > 0.0 && value <= most) {
+            let cause = match value > most {
+                true => format!("{} is more than {limit}, {}", Short(value), Short(most)),
+                false => format!("{} is impossible", Short(value)),
+            };
+            let help = format!(
+                "give more than 0 and at most {}, or raise {limit}",
+                Short(most)
+            );
+            self.say(key, cause, help);
         }
     }
 
@@ -67,11 +103,12 @@ impl<'a> Judge<'a> {
                 Short(high.1),
                 Short(low.1)
             );
-            self.say(
-                high.0,
-                cause,
-                format!("raise {} or lower {}", high.0, low.0),
-            );
+            let exchanged = match low.1 > high.1 {
+                true => "exchange the two if they stand one for the other, or ",
+                false => "",
+            };
+            let help = format!("{exchanged}raise {} or lower {}", high.0, low.0);
+            self.say(high.0, cause, help);
         }
     }
 

@@ -685,6 +685,23 @@ mod tests {
         assert!(blind.contains("there is no camera `ear`"), "{blind}");
         let turning = refused("overrun_mm = 0.1", "overrun_mm = 0.001");
         assert!(turning.contains("overrun_mm"), "{turning}");
+        let twice = refused("axis = \"v\"", "axis = \"u\"");
+        assert!(
+            twice.contains("another screw has the axis `u` already"),
+            "{twice}"
+        );
+        let nowhere = refused("direction = [0.0, 1.0]", "direction = [0.0, 0.0]");
+        assert!(nowhere.contains("[0, 0] shows nowhere"), "{nowhere}");
+        let beyond = refused("first_mm = -2.5", "first_mm = -25.0");
+        assert!(
+            beyond.contains("platform.calibrate.first_mm: strokes and overrun"),
+            "{beyond}"
+        );
+        let fast = refused("speed_mm_per_s = 10.0", "speed_mm_per_s = 500.0");
+        assert!(
+            fast.contains("500 is more than the least speed_max_mm_per_s"),
+            "{fast}"
+        );
     }
 
     #[test]

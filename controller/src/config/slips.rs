@@ -200,10 +200,17 @@ pub(super) fn comment_at(line: &str) -> usize {
     }
 }
 
+/// Whether a line is a mark of a version control.
+pub(super) fn is_mark(line: &str) -> bool {
+    let marks = ["<<<<<<<", "|||||||", "=======", ">>>>>>>"];
+    marks.iter().any(|it| line.starts_with(it))
+}
+
 /// What a version control leaves in a file of which two versions could not be joined.
 fn conflict(parts: &Parts<'_>) -> Option<Slip> {
-    let marks = ["<<<<<<<", "|||||||", "=======", ">>>>>>>"];
-    marks.iter().find(|it| parts.line.starts_with(**it))?;
+    if !is_mark(parts.line) {
+        return None;
+    }
     let cause = "two versions of the file were joined here, and nobody chose between them";
     let help =
         "keep one version, and remove the other and the lines of <<<<<<<, ======= and >>>>>>>";

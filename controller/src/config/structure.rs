@@ -183,7 +183,10 @@ fn any(path: &str, value: &Value, schema: &Schema, found: &mut Found<'_>) {
             let written = found.as_written(path).unwrap_or_default();
             let help = match (expected, value) {
                 ("object", Value::Array(items)) if items.iter().all(Value::is_table) => {
-                    format!("write `[{path}]`, once")
+                    match schema["properties"].is_null() {
+                        true => format!("write `[{path}.NAME]`, once for each of them"),
+                        false => format!("write `[{path}]`, once"),
+                    }
                 }
                 _ => correction(expected, value, (key, written)),
             };
@@ -295,6 +298,11 @@ fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
 }
 
 fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
+    if let Some(flat) = flattened(items, schema) {
+        found.replace(path, Some(Value::Array(flat.clone())));
+        let help = format!("write it with one pair of brackets: {}", Value::Array(flat));
+        return say(found, path, "a list in a list".to_owned(), help);
+    }
     let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
     let count = items.len() as u64;
     if least.is_some_and(|it| count < it) || most.is_some_and(|it| count > it) {
@@ -314,7 +322,7 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
                 1 => "1 entry".to_owned(),
                 count => format!("{count} entries"),
             },
-            match has_commas(items, least) {
+            match type_of(&schema["items"]) == "number" && has_commas(items, least) {
                 true => with_points(found.as_written(path).unwrap_or_default()),
                 false => format!("give {wanted}"),
             },
@@ -342,12 +350,26 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
             _ => path.to_owned(),
         };
         let told = found.findings.len();
-        any(&own, item, &schema["items"], found);
-        // Our own words stand at the list; they hold for each number of it.
+        // Our own words stand at the list; they hold for each number of it, and say more than its type does.
+        let is_bound = !schema["maximum"].is_null() || !schema["x-magnitude"].is_null();
+        if let (Some(seen), true) = (figure(item), is_bound) {
+            number(&own, seen, schema, found);
+        }
+        if found.findings.len() == told {
+            any(&own, item, &schema["items"], found);
+        }
         if let (Some(seen), true) = (figure(item), found.findings.len() == told) {
             number(&own, seen, schema, found);
         }
     }
+}
+
+/// `[[0], [1]]` and `[[0, 1]]` as one list, where that is what was meant.
+fn flattened(items: &[Value], schema: &Schema) -> Option<Vec<Value>> {
+    let inner = items.iter().map(Value::as_array);
+    let inner = inner.collect::<Option<Vec<_>>>()?;
+    let flat: Vec<Value> = inner.into_iter().flatten().cloned().collect();
+    (!flat.is_empty() && takes(schema, &Value::Array(flat.clone()))).then_some(flat)
 }
 
 fn takes_text(value: &str, schema: &Schema) -> bool {

@@ -231,6 +231,7 @@ fn slip(line: &str, whole: &str, count: usize, (schema, wanted): (&Schema, &Want
             .then(informed)
             .filter(is_taken)
             .unwrap_or_else(|| slips::of_lines(line, whole, end, count)),
+        None if slips::is_mark(line) => slips::of_line(line, at),
         None => headings::of_schema(line, schema).unwrap_or_else(informed),
     }
 }

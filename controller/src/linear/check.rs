@@ -185,15 +185,20 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
         ("reference_speed_mm_per_s", zero.reference_speed_mm_per_s),
         ("search_speed_mm_per_s", zero.search_speed_mm_per_s),
     ] {
-        judge.within(key, value, 0.0, speed_max);
+        judge.up_to(key, value, (speed_max, "speed_max_mm_per_s"));
     }
     if zero.level_below_peak_v * 1e3 <= zero.delta1_mv {
         judge.say(
             "level_below_peak_v",
-            "is not above delta1",
-            "the flanks lie well below the peak",
+            format!(
+                "the flanks lie {} V below the peak, and `delta1_mv` takes {} mV for the same",
+                Short(zero.level_below_peak_v),
+                Short(zero.delta1_mv)
+            ),
+            "give level_below_peak_v more than delta1_mv, or lower that one: the flanks lie well below the peak",
         );
     } else if axis.motion.has_travel()
+        && zero.rail_low_v < zero.rail_high_v
         && (0.1..=1e5).contains(&zero.time_limit_s)
         && let Err(error) = assemble::hall_settings(zero, &axis.motion).validate()
     {

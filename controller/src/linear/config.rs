@@ -61,7 +61,7 @@ pub struct ZeroConfig {
     /// At or above it a sensor counts as saturated.
     pub rail_high_v: f64,
     /// Rms noise of one sample.
-    #[schemars(extend("x-range" = "0 or more"))]
+    #[schemars(range(min = 0.0))]
     pub noise_mv: f64,
     /// A zero that is less certain is refused.
     #[schemars(range(min = 0.0001, max = 10000.0))]

@@ -14,7 +14,11 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     let Some(platform) = &config.platform else {
         return;
     };
-    check_inconsistency(&mut Judge::at("platform".into(), findings), platform);
+    // How many screws there are, nobody knows while one stands there twice.
+    let judge = &mut Judge::at("platform".into(), findings);
+    if !names_an_axis_twice(judge, platform) {
+        check_inconsistency(judge, platform);
+    }
     check_references(findings, config, platform);
     check_names(findings, config);
     if let Some(run) = &platform.calibrate {
@@ -86,18 +90,17 @@ fn check_speed(judge: &mut Judge<'_>, config: &MachineConfig, platform: &Platfor
             .filter_map(|it| config.axis.get(&it.axis));
         axes.map(|it| of(&it.motion)).fold(f64::INFINITY, f64::min)
     };
-    let (speed, acceleration) = (platform.speed_mm_per_s, platform.acceleration_mm_per_s2);
-    judge.within(
+    let fastest = least(|it| it.speed_max_mm_per_s);
+    judge.up_to(
         "speed_mm_per_s",
-        speed,
-        0.0,
-        least(|it| it.speed_max_mm_per_s),
+        platform.speed_mm_per_s,
+        (fastest, "the least speed_max_mm_per_s of its axes"),
     );
-    judge.within(
+    let steepest = least(|it| it.acceleration_mm_per_s2);
+    judge.up_to(
         "acceleration_mm_per_s2",
-        acceleration,
-        0.0,
-        least(|it| it.acceleration_mm_per_s2),
+        platform.acceleration_mm_per_s2,
+        (steepest, "the least acceleration_mm_per_s2 of its axes"),
     );
 }
 
@@ -133,7 +136,13 @@ fn check_references(
             );
         }
         let [x, y] = actuator.direction;
-        judge.within("direction", hypot(x, y), 1e-6, 1e6);
+        if !(1e-6..=1e6).contains(&hypot(x, y)) {
+            judge.say(
+                "direction",
+                format!("[{}, {}] shows nowhere", Short(x), Short(y)),
+                "give where the stroke moves the platform, such as [1.0, 0.0] for x; its length does not matter",
+            );
+        }
         let axis = config.axis.get(&actuator.axis);
         if axis.is_some_and(|it| actuator.index_mm >= it.motion.soft_max_mm) {
             judge.say(
@@ -227,19 +236,49 @@ fn check_travel(
         let Some(axis) = config.axis.get(&actuator.axis) else {
             continue;
         };
-        let fits = strokes.first_mm - run.overrun_mm >= axis.motion.soft_min_mm
-            && strokes.last_mm + run.overrun_mm <= axis.motion.soft_max_mm;
-        if !fits && axis.motion.has_travel() {
-            judge.say(
-                "",
-                format!(
-                    "strokes and overrun leave the soft limits of axis {} ({} to {} mm)",
-                    actuator.axis, axis.motion.soft_min_mm, axis.motion.soft_max_mm
-                ),
-                "shorten the strokes or the overrun",
-            );
-        }
+        check_reach(
+            judge,
+            (&actuator.axis, &axis.motion),
+            (strokes, run.overrun_mm),
+        );
     }
+}
+
+/// The end that leaves the soft limits, or the overrun where only that does.
+fn check_reach(
+    judge: &mut Judge<'_>,
+    (axis, motion): (&str, &MotionConfig),
+    (strokes, overrun_mm): (StrokesConfig, f64),
+) {
+    let (low, high) = (motion.soft_min_mm, motion.soft_max_mm);
+    let (first, last) = (strokes.first_mm, strokes.last_mm);
+    let fits = first - overrun_mm >= low && last + overrun_mm <= high;
+    if fits || !motion.has_travel() {
+        return;
+    }
+    let (key, help) = match (first < low, last > high) {
+        (true, _) => (
+            "first_mm",
+            format!("give at least {}", Short(low + overrun_mm)),
+        ),
+        (false, true) => (
+            "last_mm",
+            format!("give at most {}", Short(high - overrun_mm)),
+        ),
+        (false, false) => (
+            "overrun_mm",
+            "shorten the strokes or the overrun".to_owned(),
+        ),
+    };
+    judge.say_once(
+        key,
+        format!(
+            "strokes and overrun leave the soft limits of axis {axis} ({} to {} mm)",
+            Short(low),
+            Short(high)
+        ),
+        help,
+    );
 }
 
 fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &PlatformConfig) {
@@ -247,9 +286,7 @@ fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &P
         Ok(held) => held,
         Err(error) => {
             let help = "check point_mm and direction of each [[platform.actuator]]";
-            if !names_an_axis_twice(judge, platform) {
-                judge.say("actuator", error.to_string(), help);
-            }
+            judge.say("actuator", error.to_string(), help);
             return;
         }
     };

@@ -26,12 +26,8 @@ pub(crate) fn check_rotaries(config: &MachineConfig, findings: &mut Vec<Finding>
         if let Some(zero) = &rotary.zero {
             let judge = &mut Judge::at(format!("rotary.{name}.zero"), findings);
             let speed = zero.index_speed_deg_per_s;
-            judge.within(
-                "index_speed_deg_per_s",
-                speed,
-                1e-3,
-                rotary.speed_max_deg_per_s,
-            );
+            let most = (rotary.speed_max_deg_per_s, SPEED_MAX);
+            judge.up_to("index_speed_deg_per_s", speed, most);
         }
         check_signal(name, config, rotary, findings);
         check_cycle(name, config, rotary, findings);
@@ -187,7 +183,8 @@ fn check_run(
         judge.say("plate", "is empty", help);
     }
     let speed = run.speed_deg_per_s.unwrap_or(rotary.speed_deg_per_s);
-    judge.within("speed_deg_per_s", speed, 1e-3, rotary.speed_max_deg_per_s);
+    let most = (rotary.speed_max_deg_per_s, SPEED_MAX);
+    judge.up_to("speed_deg_per_s", speed, most);
     if let Some(signal) = &rotary.line_signal {
         let fits = signal.speed_max(config, rotary);
         if let Some(fits) = fits.filter(|fits| speed > *fits) {
@@ -261,8 +258,11 @@ fn check_verify(
     verify: &RotaryVerifyConfig,
 ) {
     let offset = verify.offset_lines;
-    let most = f64::from(run.lines).next_down();
-    judge.within("offset_lines", offset, 0.0, most);
+    if !(0.0..f64::from(run.lines)).contains(&offset) {
+        let cause = format!("{} is impossible", Short(offset));
+        let help = format!("give 0 or more, and less than {} (`lines`)", run.lines);
+        judge.say("offset_lines", cause, help);
+    }
     let quarters = offset * 4.0;
     if quarters != quarters.round() {
         let help = "give whole lines, halves or quarters: 200, 200.5, 200.25";
@@ -277,12 +277,16 @@ fn check_verify(
     }
 }
 
+/// The key that bounds each speed.
+const SPEED_MAX: &str = "speed_max_deg_per_s";
+
 /// Positions of 32 bits.
 const REGISTER: u64 = 1 << 32;
 
 fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryConfig) {
     let speed_max = rotary.speed_max_deg_per_s;
-    judge.within("speed_deg_per_s", rotary.speed_deg_per_s, 0.0, speed_max);
+    let most = (speed_max, SPEED_MAX);
+    judge.up_to("speed_deg_per_s", rotary.speed_deg_per_s, most);
     if let Some(kept) = &rotary.kept_zero {
         kept.check(judge);
         if kept.is_absolute() {

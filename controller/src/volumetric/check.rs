@@ -8,7 +8,7 @@ use crate::config::MachineConfig;
 use crate::config::judge::{Finding, Judge};
 use crate::volumetric::check::detectors::check_detectors;
 use crate::volumetric::settings;
-use crate::volumetric::{ReactionName, VolumetricConfig};
+use crate::volumetric::{InfluenceConfig, ReactionName, VolumetricConfig};
 use machine::engine::{CHANNELS_MAX, SPOTS_MAX, THERMOMETERS_MAX};
 
 pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
@@ -67,9 +67,36 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             );
         }
     }
+    check_clock(judge, config, volumetric);
     if let Err(error) = settings::volumetric_chain(volumetric) {
         let help = "name the foundation F, and X, Y and Z once each, from the workpiece to the tool, such as \"FXYZ\"";
         judge.say("chain", error.to_string(), help);
+    }
+}
+
+/// One clock gives the set-points of all three (docs/engine.md).
+fn check_clock(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+    let axes = volumetric.axes.iter();
+    let axes = axes.filter_map(|name| Some((name, config.axis.get(name)?)));
+    let periods = axes.filter_map(|(name, axis)| {
+        let bus = axis.port();
+        Some((name, bus, config.can.get(bus)?.sync_period_ms))
+    });
+    let periods: Vec<_> = periods.collect();
+    let Some((first, bus, period_ms)) = periods.first() else {
+        return;
+    };
+    let other = periods.iter().find(|it| (it.2 - period_ms).abs() > 1e-9);
+    if let Some((name, other_bus, other_ms)) = other {
+        judge.say(
+            "axes",
+            format!(
+                "axis {first} hears SYNC each {} ms ({bus}), axis {name} each {} ms ({other_bus})",
+                Short(*period_ms),
+                Short(*other_ms)
+            ),
+            format!("give can.{other_bus} and can.{bus} one sync_period_ms: axes that are corrected together take their set-points together"),
+        );
     }
 }
 
@@ -100,8 +127,9 @@ fn check_volume(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volu
         let fits =
             low - room_mm >= axis.motion.soft_min_mm && high + room_mm <= axis.motion.soft_max_mm;
         if !fits && axis.motion.has_travel() {
-            judge.say(
-                "low_mm",
+            let is_low = low - room_mm < axis.motion.soft_min_mm;
+            judge.say_once(
+                if is_low { "low_mm" } else { "high_mm" },
                 format!(
                     "{low} to {high} mm with corrections of {} mm leave the soft limits \
                      of axis {name}, {} to {} mm",
@@ -129,11 +157,11 @@ fn check_zero(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
         let Some(axis) = config.axis.get(name) else {
             continue;
         };
-        judge.within(
+        let limit = format!("axis.{name}.speed_max_mm_per_s");
+        judge.up_to(
             "zero.search_speed_mm_per_s",
             zero.search_speed_mm_per_s,
-            1e-3,
-            axis.motion.speed_max_mm_per_s,
+            (axis.motion.speed_max_mm_per_s, &limit),
         );
         let inside = index_mm >= axis.motion.soft_min_mm && index_mm < axis.motion.soft_max_mm;
         if !inside && axis.motion.has_travel() {
@@ -263,16 +291,21 @@ fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     for (at, bend) in volumetric.bend.iter().enumerate() {
         let key = |key: &str| format!("bend.{at}.{key}");
         let missing = |it: usize| it >= known;
-        if missing(bend.over) || bend.under.is_some_and(missing) || bend.under == Some(bend.over) {
+        let places = [("over", Some(bend.over)), ("under", bend.under)];
+        for (name, place) in places {
+            if let Some(place) = place.filter(|it| missing(*it)) {
+                judge.say(
+                    &key(name),
+                    format!("there is no thermometer {place}, only {known} of them"),
+                    "count [[volumetric.temperature]] from 0",
+                );
+            }
+        }
+        if bend.under == Some(bend.over) {
             judge.say(
-                &key("over"),
-                format!(
-                    "thermometers {} and {} are not two of the {known}",
-                    bend.over,
-                    bend.under
-                        .map_or_else(|| "none".to_owned(), |it| it.to_string())
-                ),
-                "count [[volumetric.temperature]] from 0",
+                &key("under"),
+                format!("thermometer {} is above and below the guide", bend.over),
+                "give the one on the other side of the guide, or leave `under` out",
             );
         }
         if bend.axis == bend.towards {
@@ -299,8 +332,9 @@ fn check_bends(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
 
 fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
     let mut seen = Vec::new();
-    for it in &volumetric.influence {
+    for (at, it) in volumetric.influence.iter().enumerate() {
         let key = (it.axis, it.direction, it.along);
+        check_influence(judge, at, it);
         if it.axis == it.direction {
             judge.say(
                 "influence",
@@ -313,8 +347,29 @@ fn check_influences(judge: &mut Judge<'_>, volumetric: &VolumetricConfig) {
         }
         seen.push(key);
     }
-    if let Err(error) = settings::influences(&volumetric.influence) {
-        judge.say("influence", error.to_string(), "");
+}
+
+/// A straight line goes through two nodes at least, from one position to the next, and each has a factor.
+fn check_influence(judge: &mut Judge<'_>, at: usize, influence: &InfluenceConfig) {
+    let (positions, factors) = (&influence.position_mm, &influence.factor);
+    let rises = positions.windows(2).all(|pair| pair[0] < pair[1]);
+    if positions.len() < 2 || !rises {
+        judge.say(
+            &format!("influence.{at}.position_mm"),
+            format!("{positions:?} are no positions that follow each other"),
+            "give two positions or more, each larger than the one before",
+        );
+    }
+    if positions.len() != factors.len() {
+        judge.say(
+            &format!("influence.{at}.factor"),
+            format!(
+                "{} factors for {} positions",
+                factors.len(),
+                positions.len()
+            ),
+            "give one factor for each of `position_mm`",
+        );
     }
 }
 
@@ -377,7 +432,7 @@ mod tests {
         check(
             high,
             "high_mm = [502.9,",
-            ".low_mm",
+            ".high_mm",
             "leave the soft limits",
         );
         let tool = "tool_offset_mm = [0.0, 0.0, -100.0]";
@@ -459,8 +514,15 @@ mod tests {
         check(
             "intensity_max_v = 11.0",
             "intensity_max_v = 4.0",
-            slider,
-            "intensity",
+            &format!("{slider}.intensity_max_v"),
+            "greater than intensity_min_v",
+        );
+        let end = ".beam.x.end_mm";
+        check(
+            "end_mm = 600.0\n",
+            "end_mm = -100.0\n",
+            end,
+            "begins at -100 mm",
         );
         let key = format!("{slider}.age_max_ms");
         check(
@@ -515,9 +577,16 @@ mod tests {
             "over = 0\n",
             "over = 6\n",
             ".bend.0.over",
-            "not two of the 6",
+            "there is no thermometer 6",
         );
-        check("under = 1\n", "under = 0\n", ".bend.0.over", "not two");
+        check(
+            "under = 1\n",
+            "under = 9\n",
+            ".bend.0.under",
+            "there is no thermometer 9",
+        );
+        let under = ".bend.0.under";
+        check("under = 1\n", "under = 0\n", under, "above and below");
         check(
             "towards = \"z\"",
             "towards = \"x\"",
@@ -530,6 +599,49 @@ mod tests {
             ".bend.0.gradient_max_k",
             "0",
         );
+    }
+
+    #[test]
+    fn axes_that_are_corrected_together_hear_one_sync() {
+        let second = "\n[can.can1]\ntransport = \"slcan\"\npath = \"/dev/ttyACM9\"\nbitrate_bit_per_s = 1000000\n\
+                      sync_period_ms = 5.0\nmaster_node_id = 126\nmaster_heartbeat_ms = 250\n";
+        let z = VOLUMETRIC.find("[axis.z]").expect("it has one");
+        let (before, behind) = VOLUMETRIC.split_at(z);
+        let text = format!(
+            "{before}{}{second}",
+            behind.edit_first("bus = \"can0\"", "bus = \"can1\"")
+        );
+        let refused = parse(&text, "machine.toml").unwrap_err().to_string();
+        assert!(refused.contains("axis z each 5 ms (can1)"), "{refused}");
+        let alike = text.edit("sync_period_ms = 5.0", "sync_period_ms = 2.0");
+        parse(&alike, "machine.toml").unwrap_or_else(|error| panic!("{error}"));
+    }
+
+    #[test]
+    fn what_a_detector_sees_of_others_is_given_from_place_to_place() {
+        let influence = |positions: &str, factors: &str| {
+            format!(
+                "[[volumetric.influence]]\naxis = \"x\"\ndirection = \"y\"\nalong = \"z\"\n\
+                 position_mm = {positions}\nfactor = {factors}\n[volumetric.zero]"
+            )
+        };
+        let check = |positions: &str, factors: &str, key: &str, says: &str| {
+            let to = influence(positions, factors);
+            check(
+                "[volumetric.zero]",
+                &to,
+                &format!(".influence.0.{key}"),
+                says,
+            );
+        };
+        check("[0.0, 1.0]", "[0.1]", "factor", "1 factors for 2");
+        check(
+            "[1.0, 0.0]",
+            "[0.1, 0.2]",
+            "position_mm",
+            "follow each other",
+        );
+        check("[1.0]", "[0.1]", "position_mm", "follow each other");
     }
 
     #[test]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::Edit;
 use crate::config::{ConfigError, parse, schema};
 
 const LINEAR: &str = include_str!("../../../../configs/machines/linear.toml");
@@ -113,4 +114,19 @@ fn a_file_with_one_is_told_once() {
         panic!("{findings:#?}")
     };
     assert!(one.help.starts_with("write `[machine]`"), "{one}");
+}
+
+#[test]
+fn two_versions_of_a_part_are_told_once_and_the_first_is_read_on() {
+    let from = "following_error_limit_um = 500.0\n";
+    let to = "<<<<<<< HEAD\nfollowing_error_limit_um = 500.0\n=======\nfollowing_error_limit_um = 900.0\n>>>>>>> other\n";
+    let text = LINEAR.edit(from, to);
+    let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+        panic!("nobody chose")
+    };
+    assert_eq!(findings.len(), 1, "{findings:#?}");
+    assert!(
+        findings[0].help.starts_with("keep one version"),
+        "{findings:#?}"
+    );
 }

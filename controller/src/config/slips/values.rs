@@ -6,7 +6,8 @@ use crate::config::unit::{converted, is_another, is_unit, magnified, split_unit}
 
 pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
     let value = parts.value?;
-    ended(parts, value)
+    template(parts, value)
+        .or_else(|| ended(parts, value))
         .or_else(|| decimal_comma(parts, value))
         .or_else(|| hexadecimal(parts, value))
         .or_else(|| with_a_unit(parts, value))
@@ -16,6 +17,19 @@ pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
         .or_else(|| backslash(parts, value))
         .or_else(|| quotes(parts, value))
         .or_else(|| word(parts, value))
+}
+
+/// What a program was to put a value in the place of.
+fn template(parts: &Parts<'_>, value: &str) -> Option<Slip> {
+    let marks = [("{{", "}}"), ("${", "}"), ("<%", "%>"), ("%(", ")")];
+    let is_place = |it: &(&str, &str)| value.starts_with(it.0) && value.contains(it.1);
+    marks.iter().find(|it| is_place(it))?;
+    let cause = format!(
+        "`{}` is a place in a template, and nothing filled it in",
+        shown(value)
+    );
+    let help = "give the value that belongs there; texts in quotes, numbers as they are";
+    Some(Slip::new(parts.value_at, cause, help.into(), None))
 }
 
 /// A line that ends as those of other languages do.

@@ -44,11 +44,22 @@ pub(super) fn number(path: &str, seen: f64, schema: &Schema, found: &mut Found<'
     let is_within = low.is_none_or(|it| value >= it) && high.is_none_or(|it| value <= it);
     let is_whole = type_of(schema) != "integer" || seen.fract() == 0.0;
     if !(is_within && is_whole && seen.is_finite()) {
+        let either = schema["x-magnitude"].is_array();
         let help = match (low, high) {
+            (Some(0.0), Some(high)) if either => {
+                format!("give {} to {}", whole(-high), whole(high))
+            }
+            (Some(low), Some(high)) if either => {
+                format!("give {} to {}, with either sign", whole(low), whole(high))
+            }
             (Some(low), Some(high)) => format!("give {} to {}", whole(low), whole(high)),
             (Some(low), None) => format!("give {} or more", whole(low)),
             (None, Some(high)) => format!("give {} or less", whole(high)),
             (None, None) => "give a number".into(),
+        };
+        let help = match schema["x-range"].as_str() {
+            Some(more) => format!("{help} ({more})"),
+            None => help,
         };
         found.doubt(path, (low, high));
         say_size(found, path, seen, help);

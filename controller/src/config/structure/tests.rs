@@ -164,7 +164,7 @@ fn each_number_of_a_list_is_judged() {
     for (to, says) in [
         ("1500.0", ["1500 is impossible", "0 to 1000"]),
         ("-1500.0", ["-1500 is impossible", "0 to 1000"]),
-        ("nan", ["NaN is impossible", "give a number"]),
+        ("nan", ["NaN is impossible", "give -1000 to 1000"]),
     ] {
         let to = format!("expansion_ppm_per_k = [{to},");
         check(VOLUMETRIC, from, &to, key, says);
@@ -332,5 +332,50 @@ fn what_stands_in_the_file_is_what_is_proposed() {
         to,
         "axis.x.identity.vendor_id",
         says,
+    );
+}
+
+#[test]
+fn a_list_in_a_list_is_told_with_one_pair_of_brackets() {
+    let says = ["a list in a list", "brackets: [0, 1]"];
+    for to in ["channels = [[0], [1]]", "channels = [[0, 1]]"] {
+        check(
+            LINEAR,
+            "channels = [0, 1]",
+            to,
+            "analog.hall.channels",
+            says,
+        );
+    }
+}
+
+#[test]
+fn decimal_commas_are_told_of_lists_of_whole_numbers_of_no_channels() {
+    let from = "channels = [0, 1]";
+    let to = "channels = [0, 1, 2, 3]";
+    let found = findings(&LINEAR.edit_first(from, to));
+    assert!(
+        found.iter().all(|it| !it.help.contains("0.1")),
+        "{found:#?}"
+    );
+}
+
+#[test]
+fn a_list_of_sections_that_have_names_is_told_with_a_place_for_the_name() {
+    let found = findings(&LINEAR.edit_first("[serial.laser]", "[[serial]]"));
+    assert_eq!(
+        found[0].help, "write `[serial.NAME]`, once for each of them",
+        "{found:#?}"
+    );
+}
+
+#[test]
+fn a_place_in_a_template_is_told_as_that() {
+    let text = LINEAR.edit_first("delta1_mv = 20.0", "delta1_mv = {{ value }}");
+    let found = findings(&text);
+    assert_eq!(found.len(), 1, "{found:#?}");
+    assert!(
+        found[0].cause.contains("nothing filled it in"),
+        "{found:#?}"
     );
 }

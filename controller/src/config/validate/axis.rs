@@ -15,12 +15,8 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
         ("soft_min_mm", motion.soft_min_mm),
         ("soft_max_mm", motion.soft_max_mm),
     );
-    judge.within(
-        "speed_mm_per_s",
-        motion.speed_mm_per_s,
-        1e-3,
-        motion.speed_max_mm_per_s,
-    );
+    let fastest = (motion.speed_max_mm_per_s, "speed_max_mm_per_s");
+    judge.up_to("speed_mm_per_s", motion.speed_mm_per_s, fastest);
     let drive = axis.drive.family();
     drive.check(judge, config.wiring());
     if axis.zero.is_some() && !drive.samples_at_sync() {
@@ -144,6 +140,19 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
                 key,
                 cause: format!("amplifier {address} on {line} is already {other}"),
                 help: "every amplifier on a line needs its own address".into(),
+            });
+        }
+    }
+    for (name, module) in &config.analog {
+        let Some(address) = module.address() else {
+            continue;
+        };
+        let key = format!("analog.{name}.address");
+        if let Some(other) = taken.insert((module.port(), address), key.clone()) {
+            findings.push(Finding {
+                key,
+                cause: format!("address {address} on {} is already {other}", module.port()),
+                help: "every module on a line needs its own address".into(),
             });
         }
     }

@@ -131,7 +131,7 @@ pub struct AnalogConfig {
     #[serde(flatten)]
     pub module: ModuleConfig,
     /// Converter channels, in the order their readings are used; zeroing takes two: peak, slope.
-    #[schemars(extend("x-range" = "each once; 0 to 3 for `cia401`, 0 to 7 for the others"))]
+    #[schemars(extend("minimum" = 0, "maximum" = 7, "x-range" = "each once; 0 to 3 for `cia401`"))]
     #[serde(default)]
     pub channels: Vec<u8>,
     /// `cia401`: voltage of the largest reading (1e-3 to 1e3). `cia404`: largest voltage to be told
@@ -181,16 +181,30 @@ impl AnalogConfig {
 
     /// Judges what its keys must keep to together.
     pub(crate) fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
-        let used = || self.channels.iter().chain(self.temperature_channels());
-        let mut seen: Vec<u8> = used().copied().collect();
-        seen.sort_unstable();
-        seen.dedup();
-        if seen.len() != used().count() || seen.is_empty() {
+        let warmth = self.temperature_channels();
+        let both = warmth.iter().find(|it| self.channels.contains(it));
+        if let Some(both) = both {
             judge.say(
-                "channels",
-                "is empty or names a channel twice",
-                "list each used channel once",
+                "temperature_channels",
+                format!("channel {both} stands in `channels`, too, and measures one quantity"),
+                "list each channel in one of both",
             );
+        }
+        let is_empty = self.channels.is_empty() && warmth.is_empty();
+        for (key, channels) in [
+            ("channels", &*self.channels),
+            ("temperature_channels", warmth),
+        ] {
+            let mut seen = channels.to_vec();
+            seen.sort_unstable();
+            seen.dedup();
+            if seen.len() != channels.len() || is_empty && key == "channels" {
+                judge.say(
+                    key,
+                    "is empty or names a channel twice",
+                    "list each used channel once",
+                );
+            }
         }
         if self.full_scale_v.len() != self.channels.len() {
             judge.say(
@@ -227,11 +241,13 @@ mod tests {
         check(from, to, &stranger, "`device = \"cia404\"` has no such key");
         let (from, to) = ("channels = [0, 1, 2, 3, 4, 5, 6, 7]", "channels = [8]");
         let channels = format!("{key}.channels");
-        check(from, to, &channels, "channels 0 to 7");
+        check(from, to, &channels, "8 is impossible");
         let (from, to) = ("full_scale_v = [3.2,", "full_scale_v = [40.0,");
         let range = format!("{key}.full_scale_v");
         check(from, to, &range, "40 V does not fit");
         let (from, to) = ("temperature_channels = [2,", "temperature_channels = [1,");
-        check(from, to, "analog.roll_and_heat.channels", "twice");
+        let both = "analog.roll_and_heat.temperature_channels";
+        check(from, to, both, "channel 1 stands in `channels`");
+        check(from, "temperature_channels = [2, 2,", both, "twice");
     }
 }

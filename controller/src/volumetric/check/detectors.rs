@@ -2,13 +2,14 @@
 
 use std::collections::BTreeSet;
 
+use compensator::volumetric::online::SettingsError;
 use units::Short;
 
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AnalogConfig, MachineConfig};
 use crate::hardware::camera::CameraConfig;
 use crate::volumetric::PICTURE_PERIODS_MAX;
-use crate::volumetric::settings::{self, volume_axis};
+use crate::volumetric::settings::{self, BeamDetectorError, volume_axis};
 use crate::volumetric::{
     BeamConfig, BeamDetectorConfig, BeamDriftName, RollConfig, SpotCameraConfig, TemperatureConfig,
     VolumetricConfig,
@@ -205,7 +206,16 @@ fn check_drift(judge: &mut Judge<'_>, beam: &BeamConfig) {
     }
     if let (Some(source), Some(end)) = (beam.source_mm, beam.end_mm) {
         let apart = (end - source).abs();
-        judge.within("end_mm", apart, 1e-3, 1e6);
+        if !(1e-3..=1e6).contains(&apart) {
+            judge.say(
+                "end_mm",
+                format!(
+                    "the beam begins at {} mm (source_mm) and ends there",
+                    Short(source)
+                ),
+                "give where it leaves the source, and where it is seen at its end",
+            );
+        }
     }
 }
 
@@ -224,9 +234,33 @@ fn check_detector<'a>(
         check_age(judge, config, analog, detector.age_max_ms);
     }
     check_light(judge, detector);
-    if let Err(error) = settings::beam_detector(detector) {
-        let help = "configs/README.md describes every key of a beam detector";
-        judge.say("", error.to_string(), help);
+    judge.below(
+        ("intensity_min_v", detector.intensity_min_v),
+        ("intensity_max_v", detector.intensity_max_v),
+    );
+    check_curve(judge, detector);
+    match settings::beam_detector(detector) {
+        // Told of its own key.
+        Err(BeamDetectorError::Settings(SettingsError::Intensity { .. })) | Ok(_) => {}
+        Err(BeamDetectorError::Curve(_)) if !detector.curve.is_empty() => {}
+        Err(error) => {
+            let help = "configs/README.md describes every key of a beam detector";
+            judge.say("", error.to_string(), help);
+        }
+    }
+}
+
+/// A curve goes through two points at least, from one ratio to the next.
+fn check_curve(judge: &mut Judge<'_>, detector: &BeamDetectorConfig) {
+    let ratios: Vec<f64> = detector.curve.iter().map(|it| it.ratio).collect();
+    let rises = ratios.windows(2).all(|pair| pair[0] < pair[1]);
+    if !ratios.is_empty() && (ratios.len() < 2 || !rises) {
+        let seen: Vec<String> = ratios.iter().map(|it| Short(*it).to_string()).collect();
+        judge.say(
+            "curve",
+            format!("its ratios are {}", seen.join(", ")),
+            "give two points or more, each with a larger `ratio` than the one before",
+        );
     }
 }
 
