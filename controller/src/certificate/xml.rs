@@ -21,6 +21,16 @@ const TAG_MAX: usize = 8 << 10;
 /// # Errors
 /// When it is no XML, declares something, or is beyond a limit.
 pub(super) fn parsed(text: &str) -> Result<Document<'_>, Unfit> {
+    if !text
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .starts_with('<')
+    {
+        return unfit(
+            "it is no XML".to_owned(),
+            "name the file of the digital calibration certificate (DCC), as the laboratory issued it",
+        );
+    }
     if has_long_tag(text) {
         return unfit(
             format!("one of its tags is longer than {} KiB", TAG_MAX >> 10),

@@ -30,6 +30,7 @@ pub struct AxisConfig {
     #[serde(flatten)]
     pub motion: MotionConfig,
     /// How it gets its origin: the drift-free Hall search.
+    #[schemars(extend("x-device" = "cia402"))]
     pub zero: Option<ZeroConfig>,
     /// How it is calibrated.
     pub calibrate: Option<CalibrateConfig>,

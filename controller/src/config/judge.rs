@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use units::Short;
 
 use super::diagnostic::shown;
-use super::meant::word_meant;
+use super::meant::name_meant;
 use super::place::is_of_key;
 
 /// A tolerance so many times as large as the errors that are corrected is reached by any machine: its errors are larger
@@ -153,7 +153,7 @@ impl<'a> Judge<'a> {
         // `analog.hall` is how its section is called.
         let (_, last) = name.rsplit_once('.').unwrap_or(("", name));
         let own = names.iter().find(|it| **it == last).copied();
-        let meant = own.or_else(|| word_meant(name, &names));
+        let meant = own.or_else(|| name_meant(name, &names));
         let help = match (meant, add) {
             (Some(meant), _) => format!("did you mean `{meant}`? {}", capital(&known)),
             (None, Some(add)) if names.is_empty() => format!("{known}: {add}"),

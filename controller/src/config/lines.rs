@@ -75,6 +75,28 @@ pub(super) fn unfilled(text: &str, file: &str) -> Vec<Diagnostic> {
     found
 }
 
+/// Every remark that begins right behind a value, as no remark does: `16#2000` is 16.
+pub(super) fn glued(text: &str, file: &str) -> Vec<Diagnostic> {
+    let lines_with = comments(text).filter_map(|(number, comment)| {
+        let line = text.lines().nth(number - 1)?;
+        let before = line.strip_suffix(comment)?;
+        let is_glued = before.ends_with(|it: char| it.is_ascii_alphanumeric());
+        let goes_on = comment[1..].starts_with(|it: char| it.is_ascii_alphanumeric());
+        (is_glued && goes_on && before.contains('=')).then_some((number, before, comment))
+    });
+    let lines = lines(text);
+    let found = lines_with.map(|(line, before, comment)| Diagnostic {
+        file: file.to_owned(),
+        line,
+        column: before.chars().count() + 1,
+        key: marked(&lines, line).0,
+        cause: format!("`{comment}` is a remark, and no part of the value before it"),
+        help: "write the whole value (hexadecimal numbers begin with 0x), or a blank before #"
+            .into(),
+    });
+    found.collect()
+}
+
 /// Each comment, with the number of its line.
 fn comments(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let tokens = Source::new(text).lex();

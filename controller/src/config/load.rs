@@ -99,16 +99,24 @@ fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, Con
         return Err(invalid(text, file, at_values(findings).collect()));
     }
     let mut warnings = warnings::of(&config);
+    let glued = lines::glued(text, file);
     let ended = certificates::judged(&config, certificate::today(), &mut warnings);
     Ok(Loaded {
         hash: hash_of(&config),
         text: ConfigHash::of_texts(text, &[]),
-        warnings: placed(text, file, at_values(warnings)),
+        warnings: merged(placed(text, file, at_values(warnings)), glued),
         ended: placed(text, file, at_values(ended)),
         unfilled: lines::unfilled(text, file),
         config,
         patience: Patience::NONE,
     })
+}
+
+/// Both, in the order of the file.
+fn merged(mut found: Vec<Diagnostic>, more: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    found.extend(more);
+    found.sort_by_key(|it| (it.line, it.column));
+    found
 }
 
 impl Loaded {
@@ -235,9 +243,10 @@ fn read_by<C: DeserializeOwned>(
 }
 
 /// All findings, in the order of the file.
-fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> ConfigError {
+fn refused(mut recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> ConfigError {
     let findings = findings.into_iter();
     let findings = findings.filter(|(it, _)| !recovered.contested.contains(&it.key));
+    let findings = with_sizes(findings.collect(), &mut recovered.findings).into_iter();
     let mut found = placed(&recovered.text, file, findings);
     let is_mistaken = |it: &&Diagnostic| {
         let is_of_value =
@@ -250,6 +259,22 @@ fn refused(recovered: Recovered, file: &str, findings: Vec<(Finding, Part)>) -> 
     found.extend(of_syntax.filter(|it| !mistaken.contains(&it.line)));
     let found = twins::told(in_order(found));
     ConfigError::Invalid { findings: found }
+}
+
+/// `findings` without the sizes of values that are told already because of how they are written: there they are added.
+fn with_sizes(
+    mut findings: Vec<(Finding, Part)>,
+    written: &mut [Diagnostic],
+) -> Vec<(Finding, Part)> {
+    findings.retain(|(finding, part)| {
+        let mut told = written.iter_mut().filter(|_| *part == Part::Size);
+        let Some(own) = told.find(|it| it.key == finding.key) else {
+            return true;
+        };
+        own.help += &format!("; but {}: {}", finding.cause, finding.help);
+        false
+    });
+    findings
 }
 
 /// By lines, but what a section lacks behind what is wrong in it, which it may be.

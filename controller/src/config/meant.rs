@@ -28,6 +28,31 @@ pub(super) fn word_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
     is_only.then_some(best)
 }
 
+/// Likewise of names that were given: `hall_2` is another one than `hall_1`, and no slip of the hand, where there are
+/// several.
+pub(super) fn name_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
+    let letters = |it: &str| {
+        it.chars()
+            .filter(|it| !it.is_ascii_digit())
+            .collect::<String>()
+    };
+    let is_numbered = |it: &str| it.contains(|it: char| it.is_ascii_digit());
+    let is_another =
+        |it: &str| is_numbered(it) && is_numbered(seen) && letters(it) == letters(seen);
+    // One that begins in the same way has only grown.
+    let mut longer = known.iter().filter(|it| it.starts_with(seen));
+    if let (Some(one), None) = (longer.next(), longer.next()) {
+        return Some(one);
+    }
+    let several = known.len() > 1;
+    let free: Vec<&str> = known
+        .iter()
+        .copied()
+        .filter(|it| !(several && is_another(it)))
+        .collect();
+    word_meant(seen, &free)
+}
+
 fn most_alike<'a>(known: &[&'a str], alike: impl Fn(&str) -> f64) -> Option<&'a str> {
     let scored = known.iter().map(|word| (alike(word), *word));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -21,9 +21,13 @@ pub(super) fn relocated(mut document: Table, schema: &Schema) -> (Table, Finding
     walk(&document, &mut Vec::new(), &mut sections);
     let mut findings = Findings::new();
     // A file with more of them is no configuration of ours.
-    let strange = sections.into_iter().filter(|it| !it.is_at_home(schema));
-    for it in strange.take(STRANGE_MAX) {
-        let Some(meant) = it.meant(&document, schema) else {
+    let strange = sections.into_iter().filter_map(|it| {
+        let namesake = it.of_namesake(&document, schema);
+        (namesake.is_some() || !it.is_at_home(schema)).then_some((it, namesake))
+    });
+    let strange: Vec<_> = strange.take(STRANGE_MAX).collect();
+    for (it, namesake) in strange {
+        let Some(meant) = namesake.or_else(|| it.meant(&document, schema)) else {
             continue;
         };
         let Some(value) = taken(&mut document, &it.parts) else {
@@ -122,6 +126,26 @@ impl Named {
             }
         }
         None
+    }
+
+    /// `analog.hall.identity` of `axis.hall.identity` where there is no axis `hall`, and the module of that name has
+    /// no such part.
+    fn of_namesake(&self, document: &Table, schema: &Schema) -> Option<Name> {
+        let [group, name, part] = &self.parts[..] else {
+            return None;
+        };
+        let has_keys = |group: &str| {
+            let own = document.get(group).and_then(|it| it.get(name));
+            let own = own.and_then(Value::as_table);
+            own.is_some_and(|it| it.values().any(|it| !is_section(it)))
+        };
+        if has_keys(group) || schema["properties"][group].is_null() {
+            return None;
+        }
+        let others = document.keys().filter(|it| *it != group && has_keys(it));
+        let others = others.map(|it| vec![it.clone(), name.clone(), part.clone()]);
+        let mut others = others.filter(|it| self.fits(it, document, schema));
+        others.next().filter(|_| others.next().is_none())
     }
 
     /// Whether its keys are known where it stands, but for one that may be mistyped.
@@ -324,6 +348,7 @@ mod tests {
             ("[analog.hall.identity]", "[adc.hall.identity]"),
             ("[axis.x.compensation]", "[axis.x.correction]"),
             ("[axis.x.verify]", "[axis.x.calibrate2]"),
+            ("[analog.hall.identity]", "[axis.hall.identity]"),
         ] {
             let text = LINEAR.edit(&format!("{right}\n"), &format!("{wrong}\n"));
             let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {

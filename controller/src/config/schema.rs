@@ -3,13 +3,14 @@
 //! A key is described once, where its field is declared: the doc comment is its meaning, the attributes
 //! its range. What is read is judged by this (`structure.rs`), `configs/README.md` is written from it
 //! (`reference.rs`), and editors complete and check by it (`configs/machine.schema.json`). Beside the words of
-//! JSON Schema there are four of our own:
+//! JSON Schema there are five of our own:
 //!
 //! | word | meaning |
 //! |---|---|
 //! | `x-magnitude` | least and most of the value without its sign |
 //! | `x-above` | the value is greater than this |
 //! | `x-range` | what else holds, in words; judged by code |
+//! | `x-device` | only this device has it |
 //! | `x-own` | every machine has a value of its own: `truestage new` marks what is an example's |
 
 use std::sync::LazyLock;

@@ -182,6 +182,9 @@ fn any(path: &str, value: &Value, schema: &Schema, found: &mut Found<'_>) {
             found.replace(path, converted(expected, value, key));
             let written = found.as_written(path).unwrap_or_default();
             let help = match (expected, value) {
+                ("array", _) if type_of(&schema["items"]) == "object" && !value.is_table() => {
+                    format!("write each below a line `[[{path}]]`")
+                }
                 ("object", Value::Array(items)) if items.iter().all(Value::is_table) => {
                     match schema["properties"].is_null() {
                         true => format!("write `[{path}.NAME]`, once for each of them"),
@@ -223,7 +226,7 @@ fn table(path: &str, seen: &Table, schema: &Schema, found: &mut Found<'_>) {
     let orphans = orphans((path, seen), &section, &free, found.schema);
     let orphans = orphans.filter(|(keys, ..)| keys.iter().all(|it| found.home_of(it).is_none()));
     if let Some((keys, home, is_list)) = &orphans {
-        tell_orphans(path, (keys, home, *is_list), found);
+        tell_orphans(path, (keys, home, *is_list), &section, found);
     }
     let mut mistyped = Vec::new();
     for (key, value) in seen {
@@ -298,6 +301,15 @@ fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
 }
 
 fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
+    let of_sections = schema["items"]["properties"].is_object();
+    if of_sections && !items.is_empty() && !items.iter().any(Value::is_table) {
+        let cause = format!(
+            "expected sections here, this is a list of {}",
+            kind(&items[0])
+        );
+        let help = format!("write each below a line `[[{path}]]`");
+        return say(found, path, cause, help);
+    }
     if let Some(flat) = flattened(items, schema) {
         found.replace(path, Some(Value::Array(flat.clone())));
         let help = format!("write it with one pair of brackets: {}", Value::Array(flat));

@@ -33,8 +33,18 @@ fn check_path(judge: &mut Judge<'_>, key: &str, path: &Path) {
         );
     }
     check_letters(judge, key, trimmed);
-    let port = trimmed.strip_prefix("COM").unwrap_or_default();
-    if !port.is_empty() && port.chars().all(|it| it.is_ascii_digit()) {
+    let (begin, port) = trimmed.split_at_checked(3).unwrap_or_default();
+    if begin == "tty" {
+        judge.say(
+            key,
+            format!("\"{trimmed}\" is looked for beside this file"),
+            format!("write the whole path: \"/dev/{trimmed}\""),
+        );
+    }
+    if begin.eq_ignore_ascii_case("com")
+        && !port.is_empty()
+        && port.chars().all(|it| it.is_ascii_digit())
+    {
         let cause = format!("\"{trimmed}\" is a port's name on Windows");
         judge.say(
             key,
@@ -52,7 +62,7 @@ fn check_path(judge: &mut Judge<'_>, key: &str, path: &Path) {
 }
 
 /// Words that stand for what somebody still has to find out.
-const PLACEHOLDERS: [&str; 7] = [
+const PLACEHOLDERS: [&str; 12] = [
     "todo",
     "fixme",
     "changeme",
@@ -60,6 +70,11 @@ const PLACEHOLDERS: [&str; 7] = [
     "xxx",
     "unknown",
     "yourserial",
+    "fillin",
+    "serial",
+    "serialnumber",
+    "stageserial",
+    "replaceme",
 ];
 
 fn check_serial(judge: &mut Judge<'_>, serial: &str) {
@@ -149,6 +164,7 @@ mod tests {
         let (from, key) = ("stage_serial = \"TS-LIN-0001\"", "machine.stage_serial");
         for (to, says) in [
             ("\"CHANGE-ME\"", "stands for a number"),
+            ("\"<serial>\"", "stands for a number"),
             ("\"ТS-LIN-0001\"", "none of the keyboard's (U+0422)"),
             ("'\"TS-LIN-0001\"'", "are part of it"),
             ("\"TS-LIN-0001 \"", "ends with a blank"),
@@ -163,5 +179,8 @@ mod tests {
             &["can.can0.path"],
             "a port's name on Windows",
         );
+        let edit = ("\"/dev/ttyACM1\"", "\"ttyACM1\"");
+        let says = "is looked for beside this file";
+        check(LINEAR, &[edit], &["can.can0.path"], says);
     }
 }

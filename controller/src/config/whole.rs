@@ -59,6 +59,10 @@ pub(super) fn told(text: &str, file: &str) -> Option<ConfigError> {
         let help = "save the file with the line ends of Unix (LF) or Windows (CRLF)";
         return tell(0, "the lines end with CR alone", help);
     }
+    if let Some(at) = again(text) {
+        let help = "remove one of the two; what differs between them must be chosen";
+        return tell(at, "the whole file stands here a second time", help);
+    }
     let other = match begin.chars().next() {
         Some('{') if begin.trim_end().ends_with('}') => "JSON",
         Some('<') if !begin.starts_with("<<<<") => "XML",
@@ -66,6 +70,26 @@ pub(super) fn told(text: &str, file: &str) -> Option<ConfigError> {
     };
     let help = "a configuration is TOML: `[section]` lines, and lines `key = value` below them";
     tell(0, &format!("this is {other}"), help)
+}
+
+/// Where a text begins anew that has all its sections by then: one that was pasted behind itself.
+fn again(text: &str) -> Option<usize> {
+    let is_heading = |it: &&str| it.starts_with('[') && it.ends_with(']');
+    let headings: Vec<&str> = text.lines().map(str::trim_end).filter(is_heading).collect();
+    let (first, second) = headings.split_at(headings.len() / 2);
+    if first.is_empty() || first != second {
+        return None;
+    }
+    // From the heading on, or from the keys above all sections.
+    let (_, behind) = text.split_once(first[0])?;
+    let start = text.len() - behind.len();
+    let second = start + behind.find(first[0])?;
+    let top = text
+        .lines()
+        .map(str::trim)
+        .find(|it| !it.is_empty() && !it.starts_with('#'))?;
+    let keys = text[start..second].rfind(top).filter(|_| top != first[0]);
+    Some(keys.map_or(second, |it| start + it))
 }
 
 /// Files beside a machine's that are TOML too: a section that only they have, what they are, and who reads them.
@@ -142,6 +166,17 @@ mod tests {
         check([vec![0xFF, 0xFE], little].concat(), 1, "UTF-16");
         let latin = [&b"# one\nname = \"a\" # 5 "[..], &[0xB5], b"m\n"].concat();
         check(latin, 2, "no UTF-8");
+    }
+
+    #[test]
+    fn a_file_that_stands_there_twice_says_from_where() {
+        let lines = LINEAR.lines().count();
+        let top = LINEAR
+            .lines()
+            .position(|it| it.starts_with("schema_version"));
+        let top = top.expect("it has one") + 1;
+        let twice = format!("{LINEAR}{LINEAR}");
+        check(twice.into_bytes(), lines + top, "a second time");
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
         return;
     };
     let judge = &mut Judge::at("volumetric".into(), findings);
-    check_axes(judge, config, volumetric);
+    let own_tables = check_axes(judge, config, volumetric);
     check_volume(judge, config, volumetric);
     check_zero(judge, config, volumetric);
     check_compensation(judge, config, volumetric);
@@ -25,10 +25,17 @@ pub(crate) fn check(config: &MachineConfig, findings: &mut Vec<Finding>) {
     check_calibrate(judge, config, volumetric);
     check_bends(judge, volumetric);
     check_room(judge, config);
+    findings.extend(own_tables);
     check_detectors(findings, config, volumetric);
 }
 
-fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &VolumetricConfig) {
+/// Gives what is wrong elsewhere: axes that have error tables of their own.
+fn check_axes(
+    judge: &mut Judge<'_>,
+    config: &MachineConfig,
+    volumetric: &VolumetricConfig,
+) -> Vec<Finding> {
+    let mut own_tables = Vec::new();
     if config.platform.is_some() {
         judge.say(
             "",
@@ -57,14 +64,17 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
             );
         }
         if axis.compensation.is_some() || axis.calibrate.is_some() {
-            judge.say(
-                "axes",
-                format!("axis {name} has an error table of its own"),
-                format!(
-                    "remove [axis.{name}.compensation] and `calibrate`: its errors are part of \
-                     the volume's"
+            let own = match axis.compensation.is_some() {
+                true => "compensation",
+                false => "calibrate",
+            };
+            own_tables.push(Finding {
+                key: format!("axis.{name}.{own}"),
+                cause: format!("axis {name} is corrected in the volume, and has an error table of its own"),
+                help: format!(
+                    "remove [axis.{name}.compensation] and [axis.{name}.calibrate]: its errors are part of the volume's"
                 ),
-            );
+            });
         }
     }
     check_clock(judge, config, volumetric);
@@ -72,6 +82,7 @@ fn check_axes(judge: &mut Judge<'_>, config: &MachineConfig, volumetric: &Volume
         let help = "name the foundation F, and X, Y and Z once each, from the workpiece to the tool, such as \"FXYZ\"";
         judge.say("chain", error.to_string(), help);
     }
+    own_tables
 }
 
 /// One clock gives the set-points of all three (docs/engine.md).

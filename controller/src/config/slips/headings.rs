@@ -5,6 +5,7 @@ use serde_json::Value as Schema;
 use super::{Parts, Slip, is_toml};
 use crate::config::diagnostic::shown;
 use crate::config::place::is_of_key;
+use crate::config::schema::{type_of, without_null};
 use crate::config::wanted::{is_list, section_meant};
 
 const OPEN: [char; 4] = ['[', '(', '{', '<'];
@@ -152,7 +153,10 @@ pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> 
         return Heading { is_list, ..heading }.told(&name);
     }
     let known = schema["properties"].as_object()?;
-    let known: Vec<_> = known.keys().map(|it| format!("[{it}]")).collect();
+    let known = known
+        .iter()
+        .filter(|(_, own)| type_of(without_null(own)) == "object");
+    let known: Vec<_> = known.map(|(name, _)| format!("[{name}]")).collect();
     let cause = format!("`{}` names no section", shown(heading.line));
     let help = match heading.line.starts_with('[') && heading.line.ends_with(']') {
         true => format!("sections are {}, and those in them", known.join(", ")),

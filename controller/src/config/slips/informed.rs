@@ -293,6 +293,14 @@ fn by_letter(line: &str, wanted: &Wanted<'_>) -> Option<Slip> {
     let of_number = parts
         .value
         .filter(|it| it.starts_with(is_number) || it.contains('/'));
+    // `B12` is a cell of a table.
+    let is_cell = |it: &str| {
+        let digits = it.trim_start_matches(|it: char| it.is_ascii_uppercase());
+        digits.len() < it.len()
+            && !digits.is_empty()
+            && digits.chars().all(|it| it.is_ascii_digit())
+    };
+    let of_number = of_number.or_else(|| parts.value.filter(|it| is_cell(it)));
     let value_at = of_number.map_or(line.len(), |_| parts.value_at);
     for (at, it) in line.char_indices().filter(|(_, it)| !it.is_whitespace()) {
         let behind = &line[at + it.len_utf8()..];

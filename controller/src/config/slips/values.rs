@@ -23,6 +23,14 @@ pub(super) fn of(parts: &Parts<'_>) -> Option<Slip> {
 fn template(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let marks = [("{{", "}}"), ("${", "}"), ("<%", "%>"), ("%(", ")")];
     let is_place = |it: &(&str, &str)| value.starts_with(it.0) && value.contains(it.1);
+    if value.starts_with('=') {
+        let cause = format!(
+            "`{}` is a formula of a table, and not its value",
+            shown(value)
+        );
+        let help = "give the value that the table shows there";
+        return Some(Slip::new(parts.value_at, cause, help.into(), None));
+    }
     marks.iter().find(|it| is_place(it))?;
     let cause = format!(
         "`{}` is a place in a template, and nothing filled it in",
@@ -261,11 +269,28 @@ fn quotes(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     if value.ends_with(']') && value.contains(" [") {
         return None;
     }
+    if let Some(inches) = inches(parts, value) {
+        return Some(inches);
+    }
     let inner: String = inner.chars().filter(|it| !"\"'".contains(*it)).collect();
     let meant = format!("\"{inner}\"");
     let cause = format!("the quotation marks of `{}` do not match", shown(value));
     let help = format!("write {}", shown(&meant));
     parts.value_meant(&meant, cause, help)
+}
+
+/// `2.36"` of a length: inches, or a mark too many.
+fn inches(parts: &Parts<'_>, value: &str) -> Option<Slip> {
+    let number = value.strip_suffix('"').filter(|it| !it.contains('"'))?;
+    let millimetres = converted(number, "in", parts.key)?;
+    let cause = format!("`{}` is no number as it is written here", shown(value));
+    let help =
+        format!("write {millimetres} where `\"` means inches, or {number} where it is a slip");
+    let slip = parts.value_meant(number, cause, help)?;
+    Some(Slip {
+        is_ambiguous: true,
+        ..slip
+    })
 }
 
 /// What stands behind the second mark is no part of the text: a remark, or a letter too many.

@@ -38,6 +38,15 @@ impl<'a> Section<'a> {
                 section.others.extend(keys.map(|(key, _)| key.as_str()));
             }
         }
+        if let Some(device) = section.device {
+            section.keys.retain(|key, own| {
+                let is_own = own["x-device"].as_str().is_none_or(|it| it == device);
+                if !is_own {
+                    section.others.push(key);
+                }
+                is_own
+            });
+        }
         if section.device.is_none() && variants.clone().next().is_some() {
             // What it can be is told where the word stands.
             section.keys.insert(DEVICE, &schema["oneOf"]);

@@ -191,10 +191,12 @@ pub(super) fn orphans<'a>(
         };
         strange.iter().all(|it| !inner[*it].is_null())
     };
-    let inner = section.keys.iter().find(|(_, own)| has_all(own));
-    let (home, is_list) = match inner {
-        Some((name, own)) => (below(path, name), own["items"].is_object()),
-        None => (places::of_all(schema, &strange)?, false),
+    let mut inner = section.keys.iter().filter(|(_, own)| has_all(own));
+    let (home, is_list) = match (inner.next(), inner.next()) {
+        // Which of several nobody knows.
+        (Some(_), Some(_)) => (below(path, "NAME"), false),
+        (Some((name, own)), None) => (below(path, name), own["items"].is_object()),
+        (None, _) => (places::of_all(schema, &strange)?, false),
     };
     (strange.len() > 1).then_some((strange, home, is_list))
 }
@@ -202,6 +204,7 @@ pub(super) fn orphans<'a>(
 pub(super) fn tell_orphans(
     path: &str,
     (orphans, home, is_list): (&[&str], &str, bool),
+    section: &Section<'_>,
     found: &mut Found<'_>,
 ) {
     let keys = orphans.iter().map(|it| below(path, it));
@@ -219,7 +222,19 @@ pub(super) fn tell_orphans(
     let cause = format!("{} are keys of {heading}", names.join(", "));
     // Of a section of this one the name is known.
     let is_known = !home.contains("NAME") && !called::is_there(home, found.document);
+    let is_own = home == &below(path, "NAME");
     let help = match is_known || !path.is_empty() && home.starts_with(&format!("{path}.")) {
+        true if is_own => {
+            let parts = section
+                .keys
+                .iter()
+                .filter(|(_, own)| without_null(own)["properties"].is_object());
+            let parts: Vec<&str> = parts.map(|it| *it.0).collect();
+            format!(
+                "write the line {heading} above them, NAME being one of {}",
+                parts.join(", ")
+            )
+        }
         true => format!("write the line {heading} above them, or remove them"),
         false => "write the line with the name of their section above them, or remove them".into(),
     };

@@ -68,7 +68,14 @@ pub(super) const fn kind(value: &Value) -> &'static str {
 pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &str)) -> String {
     match (expected, value) {
         ("number" | "integer", Value::String(text)) => {
+            let is_strange = split_unit(text.trim())
+                .and_then(|it| it.1)
+                .is_some_and(|unit| unit::is_another(unit, key));
             match (in_other_unit(text, key), number_in(text)) {
+                _ if is_strange => format!(
+                    "give {} in the unit that the key ends with, without quotes and unit",
+                    in_words(expected)
+                ),
                 (Some(number), _)
                     if expected == "integer" && !number.ends_with(".0") && number.contains('.') =>
                 {

@@ -171,7 +171,6 @@ fn all_that_is_wrong_is_told_at_once_whatever_it_is() {
         "node_id = 1",
         "[axis.x.verify",
         "targets: 1",
-        "targets: 1",
     ];
     told(&edits, &wanted);
 }

@@ -19,13 +19,6 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
     judge.up_to("speed_mm_per_s", motion.speed_mm_per_s, fastest);
     let drive = axis.drive.family();
     drive.check(judge, config.wiring());
-    if axis.zero.is_some() && !drive.samples_at_sync() {
-        judge.say(
-            "zero",
-            "the Hall search needs positions and voltages of one SYNC; this drive has none",
-            "remove the section, or use a drive on CAN",
-        );
-    }
     let counts =
         motion.soft_min_mm.abs().max(motion.soft_max_mm.abs()) * 1e6 / motion.resolution_nm.abs();
     if motion.resolution_nm.abs() > 0.0 && counts > f64::from(i32::MAX) {
@@ -174,7 +167,7 @@ pub(super) fn check_lines(config: &MachineConfig, findings: &mut Vec<Finding>) {
             findings.push(Finding {
                 key,
                 cause: format!("{line} belongs to amplifiers ({owner})"),
-                help: "give it a serial line of its own".into(),
+                help: "give each of both a serial line of its own".into(),
             });
         }
     }
@@ -288,6 +281,12 @@ mod tests {
         let end = linear.find("[axis.x.calibrate]").expect("it comes next");
         let zero = linear[begin..end].edit("axis.x", "axis.u");
         let text = format!("{AMPLIFIERS}\n{zero}");
-        check(&text, "", "", "axis.u.zero", "voltages of one SYNC");
+        check(
+            &text,
+            "",
+            "",
+            "axis.u.zero",
+            "`device = \"copley\"` has no such key",
+        );
     }
 }

@@ -150,7 +150,13 @@ fn check_bus_load(config: &MachineConfig, findings: &mut Vec<Finding>) {
                 } => {
                     // What a drive can be told (0x60C2), so that the advice can be followed.
                     let fits = period_from(shortest_period).unwrap_or(shortest_period);
-                    format!("{} ms would fit", fits.as_nanos() as f64 / 1e6)
+                    let fits = format!("{} ms would fit", fits.as_nanos() as f64 / 1e6);
+                    match config.can[name].bitrate_bit_per_s {
+                        ..1_000_000 => {
+                            format!("raise its bit rate, bitrate_bit_per_s; at this one {fits}")
+                        }
+                        _ => fits,
+                    }
                 }
                 BusLoadError::NoRoom { .. } => {
                     "raise its bit rate, or its heartbeats' periods, or put fewer devices on it"

@@ -173,10 +173,6 @@ impl Family for Cia402AxisConfig {
         [1.0, 1.0]
     }
 
-    fn samples_at_sync(&self) -> bool {
-        true
-    }
-
     fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
         if self.cyclic.is_some() {
             self.check_cyclic(judge);

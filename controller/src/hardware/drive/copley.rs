@@ -115,10 +115,6 @@ impl Family for CopleyAxisConfig {
         [0.1, 10.0]
     }
 
-    fn samples_at_sync(&self) -> bool {
-        false
-    }
-
     fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>) {
         let model = self.amplifier.as_ref().and_then(|it| it.model.as_ref());
         if model.is_some_and(|it| it.trim().is_empty()) {

@@ -55,9 +55,6 @@ pub(crate) trait Family {
     /// In how many counts its registers hold speeds (counts/s) and accelerations (counts/s²).
     fn register_units(&self) -> [f64; 2];
 
-    /// Whether its positions and voltages of other devices can be of one moment, as the Hall search needs.
-    fn samples_at_sync(&self) -> bool;
-
     /// Judges what its keys must keep to together.
     fn check(&self, judge: &mut Judge<'_>, wiring: Wiring<'_>);
 
