@@ -28,8 +28,7 @@ pub(super) fn word_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
     is_only.then_some(best)
 }
 
-/// Likewise of names that were given: `hall_2` is another one than `hall_1`, and no slip of the hand, where there are
-/// several.
+/// Likewise of names that were given: `hall_2` is another one than `hall_1`, and no slip of the hand; `qw` is one of `w`.
 pub(super) fn name_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
     let letters = |it: &str| {
         it.chars()
@@ -44,13 +43,14 @@ pub(super) fn name_meant<'a>(seen: &str, known: &[&'a str]) -> Option<&'a str> {
     if let (Some(one), None) = (longer.next(), longer.next()) {
         return Some(one);
     }
-    let several = known.len() > 1;
-    let free: Vec<&str> = known
-        .iter()
-        .copied()
-        .filter(|it| !(several && is_another(it)))
-        .collect();
-    word_meant(seen, &free)
+    let free: Vec<&str> = known.iter().copied().filter(|it| !is_another(it)).collect();
+    // Of two letters one is much, and yet only one slip.
+    let slips = |it: &&str| strsim::damerau_levenshtein(it, seen) == 1;
+    let mut near = free.iter().copied().filter(slips);
+    let by_one_slip = near
+        .next()
+        .filter(|_| near.next().is_none() && seen.len() > 1);
+    word_meant(seen, &free).or(by_one_slip)
 }
 
 fn most_alike<'a>(known: &[&'a str], alike: impl Fn(&str) -> f64) -> Option<&'a str> {

@@ -96,6 +96,7 @@ impl Named {
         let is_mistyped = self.is_mistyped(document, schema);
         /// A part of a section that is there is known by one key.
         const LENGTHENED: usize = 3;
+        const PARTED: usize = 1;
         let ways: [Way; 5] = [
             Self::swapped,
             Self::parted,
@@ -107,11 +108,12 @@ impl Named {
             // Swapped parts may be like other words; what is like the right ones is told where each is judged.
             // By one key alone nobody is known, and a key with a point in it looks like a section with one.
             let is_short = self.keys.len() < 2;
-            if nth > 0 && (is_mistyped || is_short && nth != LENGTHENED) {
+            let by_one = nth == LENGTHENED || nth == PARTED && self.parts.len() == 1;
+            if nth > 0 && (is_mistyped || is_short && !by_one) {
                 continue;
             }
             let mut found = way(self, schema);
-            if is_short && nth == LENGTHENED {
+            if is_short && by_one {
                 found.retain(|it| it.len() > 2 && at(document, &it[..it.len() - 1]).is_some());
             }
             found.retain(|it| *it != self.parts && self.fits(it, document, schema));

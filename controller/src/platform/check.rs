@@ -121,7 +121,7 @@ fn check_references(
         platform,
     );
     for (at, actuator) in platform.actuator.iter().enumerate() {
-        let judge = &mut Judge::at(format!("platform.actuator[{at}]"), findings);
+        let judge = &mut Judge::at(format!("platform.actuator.{at}"), findings);
         judge.known("axis", &actuator.axis, &config.axis, "axis");
         if config
             .axis
@@ -161,7 +161,7 @@ fn names_an_axis_twice(judge: &mut Judge<'_>, platform: &PlatformConfig) -> bool
     if let Some((at, axis)) = twice {
         let cause = format!("another screw has the axis `{axis}` already");
         judge.say(
-            &format!("actuator[{at}].axis"),
+            &format!("actuator.{at}.axis"),
             cause,
             "give each screw its own",
         );
@@ -226,7 +226,7 @@ fn check_travel(
     for (at, actuator) in platform.actuator.iter().enumerate() {
         let place = match &actuator.strokes {
             None => "platform.calibrate".to_owned(),
-            Some(_) => format!("platform.actuator[{at}].strokes"),
+            Some(_) => format!("platform.actuator.{at}.strokes"),
         };
         let judge = &mut Judge::at(place, findings);
         let strokes = run.strokes_of(actuator);

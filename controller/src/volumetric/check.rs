@@ -571,13 +571,13 @@ mod tests {
         check(
             "channel = 3\n",
             "channel = 2\n",
-            ".temperature[1].channel",
+            ".temperature.1.channel",
             "another",
         );
         check(
             "channel = 3\n",
             "channel = 1\n",
-            ".temperature[1].channel",
+            ".temperature.1.channel",
             "has no 1",
         );
     }

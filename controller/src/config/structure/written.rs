@@ -18,6 +18,10 @@ pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Valu
             let number = without_decimals(number.to_owned());
             number.parse().ok().map(Value::Integer)
         }
+        ("array", Value::String(text)) => list_in(text),
+        ("integer", Value::Float(it)) if megabits(*it, key).is_some() => {
+            megabits(*it, key).map(Value::Integer)
+        }
         ("integer", Value::Float(it)) if it.fract() == 0.0 => Some(Value::Integer(*it as i64)),
         ("boolean", Value::String(text)) => truth(text).map(Value::Boolean),
         ("string", Value::Integer(_) | Value::Float(_)) => Some(Value::String(value.to_string())),
@@ -30,6 +34,20 @@ pub(super) fn converted(expected: &str, value: &Value, key: &str) -> Option<Valu
         },
         _ => None,
     }
+}
+
+/// `1.0` of a bit rate is megabits.
+fn megabits(value: f64, key: &str) -> Option<i64> {
+    // Nothing here is slower than 10 bit/s, nor faster than 100 Mbit/s.
+    let is_meant = key.ends_with("bit_per_s") && value > 0.0 && value < 10.0;
+    is_meant.then(|| (value * 1e6).round() as i64)
+}
+
+/// The list that a text is, but for its quotes.
+fn list_in(text: &str) -> Option<Value> {
+    let text = text.trim();
+    let document = text.starts_with('[').then(|| format!("it = {text}"))?;
+    document.parse::<toml::Table>().ok()?.remove("it")
 }
 
 /// What a word of everyday says instead of `true` or `false`.
@@ -119,12 +137,19 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
         ("string", Value::Integer(_) | Value::Float(_) | Value::Boolean(_)) => {
             "give text, in quotes".into()
         }
+        ("integer", Value::Float(it)) if megabits(*it, key).is_some() => {
+            let bits = megabits(*it, key).unwrap_or_default();
+            format!("write {bits}, if {it} Mbit/s are meant: the unit is bit/s")
+        }
         ("integer", Value::Float(it)) if it.fract() == 0.0 => format!("write {it:.0}"),
         ("integer", Value::Float(_)) if parts_thousands(written) => {
             let whole = written.replace('.', "");
             format!("give a whole number: {whole}, where the point parts thousands")
         }
         ("array", Value::Table(_)) => "write a list: [...]".into(),
+        ("array", Value::String(text)) if list_in(text).is_some() => {
+            format!("write it without quotes: {}", text.trim())
+        }
         ("array", _) => "write it in brackets: [...]".into(),
         ("number" | "integer" | "boolean" | "string", Value::Array(items)) => match &items[..] {
             [_] => {

@@ -17,7 +17,7 @@ pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, platform: 
         let Some(axis) = config.axis.get(&screw.axis) else {
             continue;
         };
-        let judge = &mut Judge::at(format!("platform.actuator[{at}]"), found);
+        let judge = &mut Judge::at(format!("platform.actuator.{at}"), found);
         check_index(judge, screw, axis);
         check_lead(judge, platform, screw);
         longest_mm = longest_mm.max(axis.motion.soft_max_mm - axis.motion.soft_min_mm);
@@ -135,7 +135,7 @@ fn check_strokes(
         }
         let place = match &screw.strokes {
             None => "platform.calibrate".to_owned(),
-            Some(_) => format!("platform.actuator[{at}].strokes"),
+            Some(_) => format!("platform.actuator.{at}.strokes"),
         };
         Judge::at(place, found).say(
             "last_mm",
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn an_index_that_no_switch_has_is_told() {
-        let key = "platform.actuator[0].index_mm";
+        let key = "platform.actuator.0.index_mm";
         let edit = ("index_mm = -4.0", "index_mm = -1.0");
         let says = "with 2 mm to a turn the switch lies above -3 mm, and the axis may move down to -4.5 mm";
         check(UVW, &[edit], &[key], says);
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_screw_that_is_measured_at_one_place_of_its_turn_is_told() {
-        let key = "platform.actuator[0].lead_mm";
+        let key = "platform.actuator.0.lead_mm";
         let edits = [
             ("lead_mm = 2.0", "lead_mm = 0.002"),
             ("index_mm = -4.0", "index_mm = -4.6"),
@@ -193,7 +193,7 @@ mod tests {
         );
         // Always at the same place of its turn, and at eight of them.
         let says = "a turn is 2 mm, and the screw is measured every 2 mm";
-        let keys = [0, 1, 2].map(|at| format!("platform.actuator[{at}].lead_mm"));
+        let keys = [0, 1, 2].map(|at| format!("platform.actuator.{at}.lead_mm"));
         let keys = keys.each_ref().map(String::as_str);
         check(UVW, &[("step_mm = 0.25", "step_mm = 2.0")], &keys, says);
         let none: [&str; 0] = [];

@@ -44,7 +44,7 @@ pub(crate) fn check_detectors(
         check_roll(judge, config, roll, &mut taken);
     }
     for (at, temperature) in volumetric.temperature.iter().enumerate() {
-        let judge = &mut Judge::at(format!("volumetric.temperature[{at}]"), findings);
+        let judge = &mut Judge::at(format!("volumetric.temperature.{at}"), findings);
         check_temperature(judge, config, temperature, &mut taken);
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn check(found: &mut Vec<Finding>, config: &MachineConfig, volume: &V
         check_roll(&mut Judge::at(place, found), config, roll);
     }
     for (at, temperature) in volume.temperature.iter().enumerate() {
-        let judge = &mut Judge::at(format!("volumetric.temperature[{at}]"), found);
+        let judge = &mut Judge::at(format!("volumetric.temperature.{at}"), found);
         check_temperature(judge, temperature);
     }
 }
@@ -330,7 +330,7 @@ mod tests {
             key,
             "uncertain by 300″",
         );
-        let key = "temperature[0].noise_max_k";
+        let key = "temperature.0.noise_max_k";
         told(
             "noise_max_k = 0.2",
             "noise_max_k = 200.0",
