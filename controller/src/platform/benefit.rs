@@ -9,8 +9,31 @@ use crate::platform::handle::AlignmentPlatform;
 use crate::platform::mistaken::{Judged, Permitted};
 use crate::platform::moves::PoseMoved;
 use crate::platform::state::{difference, largest_error};
-use crate::platform::verify::PlatformVerified;
+use crate::platform::verify::{PlatformVerified, PoseChecked};
 use crate::store::{Store, short};
+
+/// Standard uncertainties that a difference must have: of a hundred platforms that only shake some two are taken for
+/// worse.
+const SURE: f64 = 2.0;
+
+/// Whether the poses were off by more with their calibrations than without, beyond what pictures do not repeat. Where
+/// single pictures do not tell that, any difference counts.
+fn is_worse(poses: &[PoseChecked], edge: Metres) -> bool {
+    let size = |it: Pose| largest_error(it, edge).value();
+    let (mut more, mut spread) = (0.0, 0.0);
+    for pose in poses {
+        let Some(known) = pose.known else {
+            continue;
+        };
+        let left = difference(pose.seen, pose.target);
+        let (with, without) = (size(left), size(sum(left, known)));
+        more += with * with - without * without;
+        // Of what both have in common only the product with what was taken away differs.
+        let u = 2.0 * size(known) * pose.uncertainty.map_or(0.0, size);
+        spread += u * u;
+    }
+    more > SURE * spread.sqrt()
+}
 
 impl AlignmentPlatform<'_> {
     /// The error that the screws' calibrations took away of a move to `target`: they sent the platform so far beside it.
@@ -47,7 +70,7 @@ impl AlignmentPlatform<'_> {
             Metres((squares.sum::<f64>() / judged.len().max(1) as f64).sqrt())
         };
         let (before, after) = (rms(&|it| it.was), rms(&|it| difference(it.was, it.said)));
-        if verified.is_within_tolerance() || after <= before {
+        if verified.is_within_tolerance() || !is_worse(&verified.poses, edge) {
             return Ok(());
         }
         let permitted = Permitted {

@@ -33,6 +33,8 @@ pub struct PoseChecked {
     pub skew_s: Option<f64>,
     /// The error that the screws' calibrations took away, as far as they know it.
     pub(crate) known: Option<Pose>,
+    /// The standard uncertainty of each part of what was seen; `None` where a single picture does not tell it.
+    pub(crate) uncertainty: Option<Pose>,
 }
 
 impl PoseChecked {
@@ -44,6 +46,7 @@ impl PoseChecked {
             error: largest_error(difference(seen, target), edge),
             skew_s,
             known: None,
+            uncertainty: None,
         }
     }
 }
@@ -192,6 +195,7 @@ impl AlignmentPlatform<'_> {
                 .flatten();
             checked.push(PoseChecked {
                 known,
+                uncertainty,
                 ..PoseChecked::new(*target, seen, edge, skew_s)
             });
             let total = targets.len() as u64;

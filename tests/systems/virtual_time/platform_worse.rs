@@ -1,5 +1,6 @@
 //! Calibrations of a platform's screws that are kept aside, and such as make it worse.
 
+use mock_bus::fault::{Fault, FaultConfig};
 use serde_json::{Value, json};
 use tests::{Bench, UVW};
 use truestage::platform::ScrewContent;
@@ -73,6 +74,30 @@ fn screws_that_make_it_worse_are_found_out_and_those_before_are_used_again() {
     let w: Vec<_> = all.into_iter().filter(|it| it.0 == "w").collect();
     let told = worse(&mut bench, &w);
     assert!(told.contains("used before, is in use again"), "{told}");
+}
+
+/// Whatever its few pictures show, and however good its calibrations are.
+#[test]
+fn a_platform_that_shakes_keeps_its_calibrations() {
+    for seed in 1..=8 {
+        let mut bench = zeroed(seed);
+        let store = bench.store.clone();
+        let mut platform = bench.machine.platform().expect("it is one");
+        platform.calibrate(&store).expect("it is made");
+        let before = in_use(&bench);
+        let shakes = Fault::Vibration { amplitude_um: 30.0 };
+        let mut emulated = bench.emulated.simulation_mut();
+        let injected = emulated.inject(FaultConfig::permanent(shakes));
+        injected.expect("the machine can shake");
+        drop(emulated);
+        let mut platform = bench.machine.platform().expect("it is one");
+        let verified = platform.verify(&store, true);
+        assert!(
+            !matches!(verified, Err(Failure::MadeWorse { .. })),
+            "seed {seed}: {verified:?}"
+        );
+        assert_eq!(in_use(&bench), before, "seed {seed}: {verified:?}");
+    }
 }
 
 /// What a verification says once the calibrations of these screws, by axis and name, have the other sign.
