@@ -17,7 +17,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::Failure;
-use crate::program::output::{Ended, Output};
+use crate::program::output::{Ended, Output, printed};
 use csv_text::csv_of;
 use entries::{Entry, entries_of};
 use mcap::mcap_of;
@@ -135,15 +135,6 @@ fn export(args: &ExportArgs, output: Output) -> Ended {
     }
 }
 
-/// Writes `bytes` to `out`, all of them.
-fn printed(out: &mut impl io::Write, bytes: &[u8]) -> Result<(), Failure> {
-    match out.write_all(bytes).and_then(|()| out.flush()) {
-        // A closed pipe (`| head`) is the reader's right.
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.map_err(failed(Path::new(STANDARD_OUTPUT))),
-    }
-}
-
 fn names(tables: &[Table]) -> String {
     let names: Vec<&str> = tables.iter().map(|it| it.name.as_str()).collect();
     names.join(", ")
@@ -244,31 +235,5 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     move |source| Failure::File {
         path: path.to_owned(),
         source,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What takes nothing any more, for a reason.
-    struct Full(io::ErrorKind);
-
-    impl io::Write for Full {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Err(self.0.into())
-        }
-    }
-
-    #[test]
-    fn a_table_that_is_not_whole_where_it_is_printed_is_a_failure_and_a_closed_pipe_is_none() {
-        let print = |kind| printed(&mut Full(kind), b"a,b\n");
-        assert!(print(io::ErrorKind::BrokenPipe).is_ok());
-        let failure = print(io::ErrorKind::StorageFull).unwrap_err();
-        assert!(matches!(failure, Failure::File { .. }), "{failure}");
     }
 }
