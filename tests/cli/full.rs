@@ -1,5 +1,6 @@
 //! Where what is printed finds no room, the exit code says so, and so does standard error.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::Command;
@@ -107,4 +108,61 @@ fn a_result_that_is_a_failure_keeps_its_exit_code_where_standard_output_is_full(
     for part in ["standard output cannot be written", "nowhere.toml"] {
         assert!(said.contains(part), "{part}: {said}");
     }
+}
+
+/// How a command ends that may write no byte to any file, as on a full disk: its exit code.
+fn without_room(here: &Path, words: &[&str]) -> Option<i32> {
+    let mut command = Command::new("sh");
+    command.args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$@\"", "sh"]);
+    command
+        .current_dir(here)
+        .arg(program("truestage"))
+        .args(words);
+    command.output().expect("every Linux has sh").status.code()
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_not_there_and_what_was_there_stays() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let here = folder.path();
+    let id = calibrated(here);
+    let page = ["report", "run.jsonl", "-o", "page.html"];
+    let export = [
+        "cal",
+        "export",
+        "machine.toml",
+        &id,
+        "--format",
+        "csv",
+        "--out",
+        "x.csv",
+    ];
+    let tables = [
+        "journal",
+        "export",
+        "run.jsonl",
+        "--format",
+        "csv",
+        "--out",
+        "tables",
+    ];
+    let names = || {
+        let files = fs::read_dir(here).expect("it is there");
+        files
+            .map(|it| it.expect("it can be read").file_name())
+            .collect::<BTreeSet<_>>()
+    };
+    fs::create_dir(here.join("tables")).expect("there is room");
+    let before = names();
+    for words in [&page[..], &export, &tables] {
+        assert_eq!(without_room(here, words), Some(2), "{words:?}");
+        assert_eq!(names(), before, "{words:?}");
+    }
+    truestage(here, &page).with_code(0);
+    let whole = fs::read(here.join("page.html")).expect("it was written");
+    assert_eq!(without_room(here, &page), Some(2));
+    assert_eq!(
+        fs::read(here.join("page.html")).expect("it is there"),
+        whole
+    );
 }

@@ -15,6 +15,7 @@ use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kept::or_by_its_service;
 use crate::program::kind::of_kind;
 use crate::program::output::{Ended, Output};
+use crate::program::written::replace;
 use crate::runs::{Change, Choice, Group, write};
 use crate::{Failure, config};
 
@@ -167,10 +168,7 @@ fn diff(store: &Store, [before, after]: [&str; 2], page: Option<&Path>, output: 
     let (mut text, mut value) = compared(store, before, after, output)?;
     if let Some(path) = page {
         let html = compared_page(store, [before, after], &text)?;
-        std::fs::write(path, html).map_err(|source| Failure::File {
-            path: path.to_owned(),
-            source,
-        })?;
+        replace(path, html.as_bytes())?;
         text += &format!("\npage in {}", path.display());
         value["page"] = json!(path);
     }

@@ -9,8 +9,7 @@ mod shape;
 mod table;
 mod thrift;
 
-use std::fs::File;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -18,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::program::output::{Ended, Output, printed};
+use crate::program::written::create;
 use csv_text::csv_of;
 use entries::{Entry, entries_of};
 use mcap::mcap_of;
@@ -177,7 +177,7 @@ fn as_files(args: &ExportArgs, tables: &[Table], output: Output) -> Ended {
             ExportFormat::Parquet => parquet_of(table),
             ExportFormat::Csv | ExportFormat::Mcap => csv_of(table).into_bytes(),
         };
-        create(path, &bytes)?;
+        create(path, &bytes).map_err(failed(path))?;
     }
     let each = tables.iter().zip(&paths);
     let lines = each.clone().map(|(table, path)| {
@@ -200,7 +200,7 @@ fn as_one_file(args: &ExportArgs, entries: &[Entry], output: Output) -> Ended {
     let beside = args.run.with_extension("mcap");
     let path = args.out.clone().unwrap_or(beside);
     refuse_existing(&path)?;
-    create(&path, &mcap_of(entries))?;
+    create(&path, &mcap_of(entries)).map_err(failed(&path))?;
     let text = format!("{} entries in {}", entries.len(), path.display());
     let value = json!({"journal": args.run, "entries": entries.len(), "file": path});
     output.result(&text, &value)
@@ -218,17 +218,6 @@ fn refuse_existing(path: &Path) -> Result<(), Failure> {
             help: "nothing was written; name another place with --out, or move it away".into(),
         }),
     }
-}
-
-/// A new file that is whole: half of one that could not be written is removed.
-fn create(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let mut file = File::create_new(path).map_err(failed(path))?;
-    let written = file.write_all(bytes);
-    if written.is_err() {
-        // The failure itself is what the operator is told.
-        let _ = std::fs::remove_file(path);
-    }
-    written.map_err(failed(path))
 }
 
 fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
