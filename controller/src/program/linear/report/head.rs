@@ -113,15 +113,14 @@ fn verdict(
     criterion: Option<&CriterionEntry>,
     figures: Option<&Figures>,
 ) -> Option<(String, bool)> {
-    let (tolerance, figures) = (Metres(criterion?.tolerance_m), figures?);
-    let seen = figures.accuracy.bidirectional;
-    let is_within = seen <= tolerance;
-    let text = text::verdict(
-        &format!("A = {:.3} µm", seen.um()),
-        &format!("{:.3} µm", tolerance.um()),
-        is_within,
-    );
-    Some((text, is_within))
+    let (criterion, figures) = (criterion?, figures?);
+    let targets: Vec<_> = criterion.targets.iter().map(at_target).collect();
+    let accuracy = figures.accuracy.bidirectional;
+    Some(uncertainty::verdict(
+        accuracy,
+        Metres(criterion.tolerance_m),
+        &targets,
+    ))
 }
 
 fn conformity(figures: &Figures) -> (String, bool) {
@@ -133,4 +132,59 @@ fn conformity(figures: &Figures) -> (String, bool) {
         it.runs, it.targets, it.runs_wanted, it.targets_wanted
     );
     (lack.unwrap_or(conforms), is_so)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use machine::records::read_journal;
+
+    use super::*;
+    use crate::program::linear::page::figures_of;
+
+    /// The head of a verification with this tolerance and expanded uncertainty, micrometres.
+    fn verified(tolerance: f64, expanded: f64) -> Fact {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/linear_calibrate.jsonl");
+        let mut journal = read_journal::<LinearLog>(Path::new(golden)).unwrap();
+        journal.header.verb = "verify".into();
+        journal.complete = true;
+        let combined = CombinedRecord {
+            u_m: expanded * 0.5e-6,
+            expanded_u_m: expanded * 1e-6,
+            degrees_of_freedom: None,
+        };
+        journal.log.criterion = Some(CriterionEntry {
+            tolerance_m: tolerance * 1e-6,
+            targets: vec![PlaceRecord {
+                position_m: 0.0,
+                forward: Some(combined),
+                reverse: None,
+            }],
+        });
+        let figures = figures_of(&journal.log.points).unwrap();
+        let mut facts = head(&journal, figures.as_ref(), &[]).into_iter();
+        facts
+            .find(|it| it.name == "tolerance")
+            .expect("it is on every page")
+    }
+
+    #[test]
+    fn a_verification_that_is_less_certain_than_its_tolerance_is_wide_is_a_red_line() {
+        let fact = verified(1000.0, 1500.0);
+        let doubt = "tolerance 1000.000 µm: within, but U = 1500.000 µm (k = 2) is larger than the tolerance: this run \
+                     cannot show it";
+        assert!(fact.value.ends_with(doubt) && fact.is_warning, "{fact:?}");
+        let fact = verified(1000.0, 1.0);
+        assert!(
+            fact.value.ends_with("tolerance 1000.000 µm: within"),
+            "{fact:?}"
+        );
+        assert!(!fact.is_warning);
+        let fact = verified(0.001, 1500.0);
+        assert!(
+            fact.value.ends_with(": NOT WITHIN") && fact.is_warning,
+            "{fact:?}"
+        );
+    }
 }
