@@ -466,6 +466,9 @@ fn check_search(zeroed: &Zeroed) {
             printed[1],
         );
     }
+    for points in ["G7: ", "G1, G2: ", "P1, P2: ", "P0: ", "G8: "] {
+        assert!(page.contains(points), "{points}is not explained: {page}");
+    }
     let u = at(&json, "/zero/origin_um_u");
     everywhere(2.0 * u, &[(&page, "of the zero: U (k = 2) ")]);
 }

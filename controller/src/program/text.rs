@@ -164,6 +164,25 @@ pub(crate) fn lack(conformity: &Conformity) -> Option<String> {
     (!lacks.is_empty()).then(|| format!("DOES NOT CONFORM TO ISO 230-2: {}", lacks.join("; ")))
 }
 
+/// The same of the run of a calibration, which nobody makes as a test by the standard.
+pub(crate) fn no_test(conformity: &Conformity) -> Option<String> {
+    let it = conformity;
+    let runs = format!("{} runs from each side ({} here)", it.runs_wanted, it.runs);
+    let targets = format!(
+        "{} targets over this range ({} here)",
+        it.targets_wanted, it.targets
+    );
+    let takes = match (it.runs < it.runs_wanted, it.targets < it.targets_wanted) {
+        (false, false) => return None,
+        (true, false) => runs,
+        (false, true) => targets,
+        (true, true) => format!("{runs} and {targets}"),
+    };
+    Some(format!(
+        "a calibration, no test by ISO 230-2, which takes {takes}"
+    ))
+}
+
 /// A closure in words; a single run of a file has none.
 pub(crate) fn closure(closure: Option<Metres>) -> String {
     closure.map_or("no closure".into(), |it| {

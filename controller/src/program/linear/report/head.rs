@@ -12,6 +12,9 @@ use crate::program::linear::uncertainty;
 use crate::program::page::head::{Fact, Made, Stated, facts_of, spread};
 use crate::program::text;
 
+/// The run of a calibration, as its journal calls it.
+pub(crate) const CALIBRATE: &str = "calibrate";
+
 /// The head of the page of `journal`; `made` are the calibrations made from it.
 pub(crate) fn head(
     journal: &ReadJournal<LinearLog>,
@@ -24,7 +27,7 @@ pub(crate) fn head(
         corrections: corrections(journal),
         uncertainty: uncertainty_of(log, made.first().map(|(_, it)| &it.content)),
         verdict: verdict(log.criterion.as_ref(), figures),
-        conformity: figures.map(conformity),
+        conformity: figures.map(|it| conformity(it, &journal.header.verb)),
         sign: "deviation = actual − target; compensation = −deviation; B = mean ↑ − mean ↓",
         made: made
             .iter()
@@ -123,8 +126,11 @@ fn verdict(
     ))
 }
 
-fn conformity(figures: &Figures) -> (String, bool) {
+fn conformity(figures: &Figures, verb: &str) -> (String, bool) {
     let it = &figures.conformity;
+    if let Some(told) = text::no_test(it).filter(|_| verb == CALIBRATE) {
+        return (told, true);
+    }
     let lack = text::lack(it);
     let is_so = lack.is_none();
     let conforms = format!(
@@ -141,12 +147,43 @@ mod tests {
     use machine::records::read_journal;
 
     use super::*;
-    use crate::program::linear::page::figures_of;
+    use crate::program::linear::page::{figures_of, html};
 
-    /// The head of a verification with this tolerance and expanded uncertainty, micrometres.
+    const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/linear_calibrate.jsonl");
+
+    fn fact(journal: &ReadJournal<LinearLog>, name: &str) -> Fact {
+        let figures = figures_of(&journal.log.points).unwrap();
+        let mut facts = head(journal, figures.as_ref(), &[]).into_iter();
+        facts
+            .find(|it| it.name == name)
+            .expect("it is on every page")
+    }
+
+    #[test]
+    fn a_calibration_is_no_test_by_the_standard_and_a_verification_is_one() {
+        let mut journal = read_journal::<LinearLog>(Path::new(GOLDEN)).unwrap();
+        let told = fact(&journal, "conformity");
+        let no_test = "a calibration, no test by ISO 230-2, which takes 5 runs from each side (";
+        assert!(
+            told.value.starts_with(no_test) && !told.is_warning,
+            "{told:?}"
+        );
+        let page = html(Path::new(GOLDEN)).unwrap();
+        assert!(
+            !page.contains("DOES NOT CONFORM") && page.matches(no_test).count() == 2,
+            "{page}"
+        );
+        journal.header.verb = "verify".into();
+        let told = fact(&journal, "conformity");
+        assert!(
+            told.value.starts_with("DOES NOT CONFORM") && told.is_warning,
+            "{told:?}"
+        );
+    }
+
+    /// The verdict of a verification with this tolerance and expanded uncertainty, micrometres.
     fn verified(tolerance: f64, expanded: f64) -> Fact {
-        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/linear_calibrate.jsonl");
-        let mut journal = read_journal::<LinearLog>(Path::new(golden)).unwrap();
+        let mut journal = read_journal::<LinearLog>(Path::new(GOLDEN)).unwrap();
         journal.header.verb = "verify".into();
         journal.complete = true;
         let combined = CombinedRecord {
@@ -162,11 +199,7 @@ mod tests {
                 reverse: None,
             }],
         });
-        let figures = figures_of(&journal.log.points).unwrap();
-        let mut facts = head(&journal, figures.as_ref(), &[]).into_iter();
-        facts
-            .find(|it| it.name == "tolerance")
-            .expect("it is on every page")
+        fact(&journal, "tolerance")
     }
 
     #[test]
