@@ -107,7 +107,13 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         &["truestage memory clear volumetric.toml --memory second"],
     ),
     ("cal list", &["truestage cal list linear.toml"]),
-    ("cal show", &["truestage cal show linear.toml 3f2a"]),
+    (
+        "cal show",
+        &[
+            "truestage cal show linear.toml",
+            "truestage cal show linear.toml 3f2a",
+        ],
+    ),
     (
         "cal diff",
         &["truestage cal diff linear.toml 3f2a 9c01 --page both.html"],
