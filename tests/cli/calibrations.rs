@@ -53,6 +53,14 @@ fn calibrations_are_listed_by_their_age_and_the_only_axis_need_not_be_named() {
     let created: Vec<&str> = listed.map(|it| text(&it["created"])).collect();
     let days = [1, 2, 3, 4, 5].map(|day| format!("2026-01-0{day}T00:00:00Z"));
     assert_eq!(created, days);
+    let show = || truestage(here, &["cal", "show", "machine.toml"]);
+    check_error(
+        &show().with_code(2),
+        &["no calibration is in use", "cal list"],
+    );
+    let ids = store.list().expect("there are some");
+    store.activate("x", &ids[0]).expect("there is room");
+    assert_eq!(text(&show().with_code(0)["id"]), ids[0]);
     let rolled = truestage(here, &["cal", "rollback", "machine.toml"]).with_code(2);
     check_error(&rolled, &["axis x: no earlier calibration", "cal list"]);
 }

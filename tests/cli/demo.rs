@@ -1,11 +1,13 @@
 //! The demonstrations: what anybody runs first.
 
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::Value;
 use tests::Rig;
 
-use crate::programs::{check_error, live_rigs, truestage};
+use crate::programs::{check_error, live_rigs, program, truestage};
+use crate::tutorial::{are_lines, blocks, repository};
 
 /// Runs the demonstration of `machine` to its end, which is a good one: as found and as left, by
 /// their places in what it prints, and a page. What is shown without terminals, and how soon, is the
@@ -51,6 +53,28 @@ fn the_linear_stage_shows_its_cycle() {
     let of = |state: &str| format!("/{state}{accuracy}");
     let (left, after) = (of("as_left"), of("as_left_after_power_cycles"));
     check("linear", &of("as_found"), [&left, &after], 2.0);
+}
+
+#[test]
+fn the_linear_stage_shows_what_the_readme_says() {
+    let readme = std::fs::read_to_string(repository().join("README.md"));
+    let readme = readme.expect("it is there");
+    let mut blocks = blocks(&readme).into_iter().map(|it| it.1);
+    let shown = blocks.find(|it| it.first().is_some_and(|it| it.starts_with("ISO 230-2")));
+    let shown = shown.expect("README shows what the demonstration prints");
+    let shown: Vec<_> = shown.into_iter().map(str::to_owned).collect();
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let mut command = Command::new(program("truestage"));
+    command
+        .args(["demo", "--in-process"])
+        .current_dir(folder.path());
+    let printed = command.output().expect("it is a program").stdout;
+    let printed = String::from_utf8(printed).expect("it prints text");
+    let lines: Vec<_> = printed.trim_start().lines().collect();
+    assert!(
+        are_lines(&shown, &lines),
+        "README has {shown:#?}, printed is\n{printed}"
+    );
 }
 
 /// What it prints without terminals.

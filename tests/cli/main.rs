@@ -8,6 +8,7 @@ mod controls;
 mod demo;
 mod example;
 mod examples;
+mod full;
 mod gantry;
 mod held;
 mod intended;

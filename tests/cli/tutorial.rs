@@ -25,7 +25,7 @@ const ELSEWHERE: [&str; 6] = ["cargo", "cd", "echo", "git", "ip", "sudo"];
 /// Verbs that judge everything, and open no port, with `--dry-run`.
 const JUDGED: [&str; 4] = ["zero", "calibrate", "verify", "move"];
 
-fn repository() -> PathBuf {
+pub(crate) fn repository() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().expect("it is in the workspace").to_owned()
 }
@@ -38,7 +38,7 @@ struct Typed {
 }
 
 /// The blocks of a document: what each is called, and its lines.
-fn blocks(document: &str) -> Vec<(&str, Vec<&str>)> {
+pub(crate) fn blocks(document: &str) -> Vec<(&str, Vec<&str>)> {
     let mut blocks: Vec<(&str, Vec<&str>)> = Vec::new();
     let mut is_open = false;
     for line in document.lines() {
@@ -97,7 +97,7 @@ fn is_line(shown: &str, line: &str) -> bool {
 }
 
 /// Whether `lines` are what is shown, from the first to the last.
-fn are_lines(shown: &[String], lines: &[&str]) -> bool {
+pub(crate) fn are_lines(shown: &[String], lines: &[&str]) -> bool {
     match (shown, lines) {
         ([], lines) => lines.is_empty(),
         ([any, shown @ ..], lines) if any.trim() == ANY => {

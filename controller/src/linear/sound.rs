@@ -14,7 +14,7 @@ impl Content for LinearContent {
     const KIND: &'static str = Self::KIND;
 
     fn summary(&self) -> String {
-        format!("{} nodes", self.nodes.len())
+        format!("{} positions", self.nodes.len())
     }
 
     fn judge(&self) -> Judged {

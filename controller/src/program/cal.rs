@@ -15,6 +15,7 @@ use crate::program::controls::import::{self, ImportArgs};
 use crate::program::kept::or_by_its_service;
 use crate::program::kind::of_kind;
 use crate::program::output::{Ended, Output};
+use crate::program::written::replace;
 use crate::runs::{Change, Choice, Group, write};
 use crate::{Failure, config};
 
@@ -30,8 +31,8 @@ pub(crate) enum CalCommand {
     Show {
         /// The machine's configuration.
         config: PathBuf,
-        /// Its name, or the beginning of it.
-        id: String,
+        /// Its name, or the beginning of it; the one in use when not given.
+        id: Option<String>,
     },
     /// Two calibrations side by side.
     Diff {
@@ -70,7 +71,12 @@ pub(crate) enum CalCommand {
 pub(crate) fn run(command: &CalCommand, output: Output) -> Ended {
     match command {
         CalCommand::List { config } => list(&opened(config)?, output),
-        CalCommand::Show { config, id } => show(&opened(config)?, id, output),
+        CalCommand::Show { config, id } => {
+            let id = id
+                .as_ref()
+                .map_or_else(|| the_used(config), |it| Ok(it.clone()));
+            show(&opened(config)?, &id?, output)
+        }
         CalCommand::Diff {
             config,
             before,
@@ -167,10 +173,7 @@ fn diff(store: &Store, [before, after]: [&str; 2], page: Option<&Path>, output: 
     let (mut text, mut value) = compared(store, before, after, output)?;
     if let Some(path) = page {
         let html = compared_page(store, [before, after], &text)?;
-        std::fs::write(path, html).map_err(|source| Failure::File {
-            path: path.to_owned(),
-            source,
-        })?;
+        replace(path, html.as_bytes())?;
         text += &format!("\npage in {}", path.display());
         value["page"] = json!(path);
     }
@@ -228,6 +231,32 @@ fn the_axis(path: &Path, axis: Option<&str>) -> Result<String, Failure> {
             })
         }
     }
+}
+
+/// The name of the only calibration in use.
+fn the_used(path: &Path) -> Result<String, Failure> {
+    let config = config::load(path)?.config;
+    let (store, groups) = (config.machine.store(), groups(&config));
+    let mut used = Vec::new();
+    for pointer in groups.iter().flat_map(|it| &it.pointers) {
+        let current = store.active(pointer)?.current;
+        used.extend(current.map(|id| (pointer, id)));
+    }
+    if let [(_, only)] = used.as_slice() {
+        return Ok(only.clone());
+    }
+    let named = used.iter().map(|(of, id)| format!("{of} {}", short(id)));
+    let named: Vec<String> = named.collect();
+    Err(match named.is_empty() {
+        true => Failure::Usage {
+            what: "no calibration is in use".into(),
+            help: "add the name of one: `truestage cal list` has all of them".into(),
+        },
+        false => Failure::Usage {
+            what: format!("several calibrations are in use: {}", named.join(", ")),
+            help: "add the name of one of them".into(),
+        },
+    })
 }
 
 /// What is used from now on: done here, or by the service that keeps the machine.

@@ -107,7 +107,13 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         &["truestage memory clear volumetric.toml --memory second"],
     ),
     ("cal list", &["truestage cal list linear.toml"]),
-    ("cal show", &["truestage cal show linear.toml 3f2a"]),
+    (
+        "cal show",
+        &[
+            "truestage cal show linear.toml",
+            "truestage cal show linear.toml 3f2a",
+        ],
+    ),
     (
         "cal diff",
         &["truestage cal diff linear.toml 3f2a 9c01 --page both.html"],
@@ -228,6 +234,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
 pub(super) const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuration, 3 refused for safety, 4 device or bus, 5 out of tolerance,\n\
      130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP";
 
+/// Of a verb that works until somebody ends it: that is how it ends well.
+const EXIT_CODES_OF_SERVICE: &str = "Exit codes: 0 done, which is also an end by Ctrl-C, SIGTERM or SIGHUP (a second one ends it at once: 130, 143,\n\
+     129), 2 usage or configuration, 3 refused for safety, 4 device or bus";
+
 /// `command` with examples and exit codes in the help of each of its verbs.
 pub(super) fn with_examples(command: Command) -> Command {
     of_each(command, "")
@@ -253,7 +263,11 @@ fn helped(verb: Command, words: &str) -> Command {
         // A word that only leads to others.
         return verb;
     }
-    verb.after_help(format!("{}\n\n{EXIT_CODES}", parts.join("\n\n")))
+    let codes = match words {
+        "serve" => EXIT_CODES_OF_SERVICE,
+        _ => EXIT_CODES,
+    };
+    verb.after_help(format!("{}\n\n{codes}", parts.join("\n\n")))
 }
 
 #[cfg(test)]
@@ -274,6 +288,17 @@ mod tests {
             .into_iter()
             .chain(does_something.then(|| path.to_owned()))
             .collect()
+    }
+
+    #[test]
+    fn a_signal_that_ends_a_service_is_a_good_end() {
+        let command = with_examples(Cli::command());
+        let help = |verb: &str| {
+            let verb = command.find_subcommand(verb).expect("there is one");
+            verb.get_after_help().expect("it has one").to_string()
+        };
+        assert!(help("serve").contains("0 done, which is also an end by Ctrl-C"));
+        assert!(help("verify").contains("130 stopped by Ctrl-C"));
     }
 
     #[test]

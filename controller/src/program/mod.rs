@@ -64,6 +64,7 @@ mod token;
 mod tried;
 mod verbs;
 mod volumetric;
+mod written;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

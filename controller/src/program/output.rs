@@ -1,6 +1,6 @@
 //! stdout for results, stderr for everything else, in the order in which it was said.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write, stdout};
 
 use serde_json::{Map, Value, json};
 
@@ -27,6 +27,36 @@ pub(crate) const SCHEMA: u32 = 1;
 
 /// What stands for the verb where the words of the command line name none that can be run.
 pub(crate) const NO_VERB: &str = "";
+
+/// Who reads what is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reader {
+    Listens,
+    /// It closed the pipe (`| head`), which is its right and no failure of the machine.
+    Left,
+}
+
+/// Writes `bytes` to `out`, which is standard output but in tests. It is flushed here, where an error can still be told:
+/// at the end of a program nobody looks at it.
+///
+/// # Errors
+/// When not all of it can be written: the disk is full.
+pub(crate) fn printed(out: &mut impl Write, bytes: &[u8]) -> Result<Reader, Failure> {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Ok(()) => Ok(Reader::Listens),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Reader::Left),
+        Err(error) => Err(unprinted(&error)),
+    }
+}
+
+/// That what was printed is not whole, and why.
+pub(crate) fn unprinted(why: &std::io::Error) -> Failure {
+    Failure::Usage {
+        what: format!("standard output cannot be written: {why}"),
+        help: "what is there is not whole: give it another place; what was measured or stored is kept all the same"
+            .into(),
+    }
+}
 
 /// How much is said on standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,8 +128,8 @@ impl Output {
     /// The result: `text` for people, `value` with `--json`.
     #[expect(clippy::unnecessary_wraps, reason = "it is how a verb ends")]
     pub(crate) fn result(self, text: &str, value: &Value) -> Ended {
-        self.print(text, value);
-        Ok(None)
+        // Not the failure of what was done, which may have moved and stored: nothing is undone or told for it.
+        Ok(self.print(text, value).err())
     }
 
     /// The result, with what the devices counted on the way.
@@ -113,19 +143,25 @@ impl Output {
     pub(crate) fn bad_result(self, text: &str, mut value: Value, failure: Failure) -> Ended {
         value["error"] = json!(failure.to_string());
         value["exit_code"] = json!(failure.exit_code());
-        self.print(text, &value);
+        self.print_failed(text, &value);
         Ok(Some(failure))
     }
 
-    fn print(self, text: &str, value: &Value) {
+    fn print(self, text: &str, value: &Value) -> Result<(), Failure> {
         let line = match self.json {
             true => self.object(value),
-            false if paint::is_wanted(&std::io::stdout()) => paint::painted(&plain(text)),
+            false if paint::is_wanted(&stdout()) => paint::painted(&plain(text)),
             false => plain(text),
         };
         progress::settle();
-        // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
-        let _ = writeln!(std::io::stdout().lock(), "{line}");
+        printed(&mut stdout().lock(), (line + "\n").as_bytes()).map(|_| ())
+    }
+
+    /// What goes with a failure: that one decides how the command ends, and what is not printed is said beside it.
+    fn print_failed(self, text: &str, value: &Value) {
+        if let Err(unprinted) = self.print(text, value) {
+            self.must_say(&format!("error: {unprinted}"));
+        }
     }
 
     /// `value` in one line, as everything is that `--json` prints: it says which version of the schema it keeps to, and
@@ -170,7 +206,7 @@ impl Output {
 
     /// Why the command line was refused, for programs.
     pub(crate) fn refused(self, why: &str, exit_code: u8) {
-        self.print("", &json!({"error": why, "exit_code": exit_code}));
+        self.print_failed("", &json!({"error": why, "exit_code": exit_code}));
     }
 
     /// Why there is no result.
@@ -180,7 +216,7 @@ impl Output {
             if let Failure::Config(ConfigError::Invalid { findings }) = failure {
                 error["findings"] = json!(findings);
             }
-            self.print("", &error);
+            self.print_failed("", &error);
         }
         self.must_say(&format!("error: {failure}"));
     }
@@ -189,6 +225,32 @@ impl Output {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What takes nothing any more, for a reason.
+    struct Full(ErrorKind);
+
+    impl Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Err(self.0.into())
+        }
+    }
+
+    #[test]
+    fn what_is_not_whole_where_it_is_printed_is_a_failure_and_a_closed_pipe_is_none() {
+        let print = |kind| printed(&mut Full(kind), b"a,b\n");
+        assert_eq!(print(ErrorKind::BrokenPipe).unwrap(), Reader::Left);
+        let failure = print(ErrorKind::StorageFull).unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        let said = failure.to_string();
+        assert!(
+            said.contains("standard output cannot be written: no storage space"),
+            "{said}"
+        );
+    }
 
     #[test]
     fn every_object_says_its_version_and_its_verb() {

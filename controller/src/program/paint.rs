@@ -8,6 +8,8 @@ use std::io::IsTerminal;
 
 use clap::builder::styling::{AnsiColor, Style};
 
+use crate::program::text::SHOWS_NOTHING;
+
 const BAD: Style = AnsiColor::Red.on_default().bold();
 const DOUBTFUL: Style = AnsiColor::Yellow.on_default();
 const GOOD: Style = AnsiColor::Green.on_default();
@@ -23,7 +25,11 @@ const BEGINNINGS: [(&str, Style); 7] = [
     ("ok ", GOOD),
 ];
 /// How a line that judges ends, and the colour of that.
-const ENDS: [(&str, Style); 2] = [(": NOT WITHIN", BAD), (": within", GOOD)];
+const ENDS: [(&str, Style); 3] = [
+    (": NOT WITHIN", BAD),
+    (": within", GOOD),
+    (SHOWS_NOTHING, BAD),
+];
 
 /// Whether `stream` is read by a person who has not asked for plain text (<https://no-color.org>).
 pub(super) fn is_wanted(stream: &impl IsTerminal) -> bool {

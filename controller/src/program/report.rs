@@ -12,6 +12,7 @@ use crate::program::linear;
 use crate::program::output::{Ended, Output};
 use crate::program::page::pictures::pictures;
 use crate::program::verbs::Verbs;
+use crate::program::written::replace;
 
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
@@ -72,7 +73,7 @@ pub(crate) fn run(args: &ReportArgs, output: Output) -> Ended {
         (None, _) => unreachable!("the command line wants a run or two"),
     };
     let path = args.output.clone().unwrap_or(beside);
-    write(&path, &html)?;
+    replace(&path, html.as_bytes())?;
     let mut text = format!("report in {}", path.display());
     let mut value = json!({"report": path});
     if let Some(figures) = figures {
@@ -91,14 +92,10 @@ fn write_pictures(folder: &Path, html: &str) -> Result<Vec<PathBuf>, Failure> {
     let each = pictures(html).into_iter();
     each.map(|it| {
         let path = folder.join(it.file);
-        write(&path, &it.svg)?;
+        replace(&path, it.svg.as_bytes())?;
         Ok(path)
     })
     .collect()
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(unwritten(path))
 }
 
 fn unwritten(path: &Path) -> impl FnOnce(std::io::Error) -> Failure {

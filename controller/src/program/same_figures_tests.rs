@@ -16,7 +16,7 @@ use crate::program::page::head::ALWAYS;
 use crate::program::platform::verbs as platform;
 use crate::program::report;
 use crate::program::rotary::told as rotary;
-use crate::program::text::ROWS;
+use crate::program::text::{ROWS, SHOWS_NOTHING};
 use crate::program::volumetric::verbs as volumetric;
 use crate::rotary::{RotaryCalibrated, RotaryVerified};
 use crate::volumetric::VolumetricCalibrated;
@@ -359,6 +359,31 @@ fn check_linear_verification(verified: &Verified) {
             (&page, "datum after the runs closure "),
         ],
     );
+    check_unsure(verified);
+}
+
+/// Less certain than its tolerance is wide, it is no pass, whatever its figure.
+#[track_caller]
+fn check_unsure(verified: &Verified) {
+    let mut unsure = verified.clone();
+    for (it, expected) in [(false, Value::Null), (true, Value::Bool(true))] {
+        let (text, json) = (
+            linear::verified_text("as_left", &unsure),
+            linear::verified_value("as_left", &unsure),
+        );
+        assert_eq!(text.contains(SHOWS_NOTHING), it, "{text}");
+        assert_eq!(json["within_tolerance"], true);
+        let warning = json["warning"].as_str();
+        assert_eq!(
+            warning.map_or(Value::Null, |it| text.contains(it).into()),
+            expected
+        );
+        let forward = unsure.uncertainty[0]
+            .forward
+            .as_mut()
+            .expect("it is calibrated so");
+        forward.standard_uncertainty = verified.tolerance;
+    }
 }
 
 /// Each target's row on the page.
@@ -440,6 +465,9 @@ fn check_search(zeroed: &Zeroed) {
             at(&json, &format!("/search/{place}/{sensor}")),
             printed[1],
         );
+    }
+    for points in ["G7: ", "G1, G2: ", "P1, P2: ", "P0: ", "G8: "] {
+        assert!(page.contains(points), "{points}is not explained: {page}");
     }
     let u = at(&json, "/zero/origin_um_u");
     everywhere(2.0 * u, &[(&page, "of the zero: U (k = 2) ")]);

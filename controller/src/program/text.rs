@@ -1,9 +1,10 @@
 //! What a person reads on a terminal.
 
+use compensator::budget::COVERAGE_FACTOR;
 use compensator::error_table::FALSE_ALARMS;
 use compensator::iso230::{Conformity, Figures, Means, OneWayFigures};
 use compensator::screw::ScrewModel;
-use units::{Approach, Metres, Several};
+use units::{Approach, Metres, Several, Short};
 
 use crate::config::MachineConfig;
 use crate::linear::settings;
@@ -61,6 +62,29 @@ pub(crate) fn verdict(figure: &str, tolerance: &str, is_within: bool) -> String 
     let verdict = if is_within { "within" } else { "NOT WITHIN" };
     format!("{figure}, tolerance {tolerance}: {verdict}")
 }
+
+/// A verdict of what is known to `expanded` (with k = 2), and whether it is good; `beyond` the tolerance, so uncertain a
+/// figure shows nothing: `A = 0.220 µm, tolerance 2.000 µm: within, but U = 31.300 µm (k = 2) is larger than …`.
+pub(crate) fn sure_verdict(
+    [figure, tolerance, expanded]: [&str; 3],
+    is_within: bool,
+    is_beyond: bool,
+) -> (String, bool) {
+    let text = verdict(figure, tolerance, is_within);
+    match is_within && is_beyond {
+        false => (text, is_within),
+        true => {
+            let doubt = format!("U = {expanded} (k = {})", Short(COVERAGE_FACTOR));
+            (
+                format!("{text}, but {doubt} is larger than the tolerance: {SHOWS_NOTHING}"),
+                false,
+            )
+        }
+    }
+}
+
+/// How a verdict ends that nobody can rely upon.
+pub(crate) const SHOWS_NOTHING: &str = "this run cannot show it";
 
 /// Unidirectional ISO 230-2 figures, micrometres.
 pub(crate) fn one_way_figures(figures: &OneWayFigures) -> String {
@@ -138,6 +162,25 @@ pub(crate) fn lack(conformity: &Conformity) -> Option<String> {
     .filter_map(|(is_so, text)| is_so.then_some(text))
     .collect();
     (!lacks.is_empty()).then(|| format!("DOES NOT CONFORM TO ISO 230-2: {}", lacks.join("; ")))
+}
+
+/// The same of the run of a calibration, which nobody makes as a test by the standard.
+pub(crate) fn no_test(conformity: &Conformity) -> Option<String> {
+    let it = conformity;
+    let runs = format!("{} runs from each side ({} here)", it.runs_wanted, it.runs);
+    let targets = format!(
+        "{} targets over this range ({} here)",
+        it.targets_wanted, it.targets
+    );
+    let takes = match (it.runs < it.runs_wanted, it.targets < it.targets_wanted) {
+        (false, false) => return None,
+        (true, false) => runs,
+        (false, true) => targets,
+        (true, true) => format!("{runs} and {targets}"),
+    };
+    Some(format!(
+        "a calibration, no test by ISO 230-2, which takes {takes}"
+    ))
 }
 
 /// A closure in words; a single run of a file has none.

@@ -137,7 +137,7 @@ fn check_stored<C: Content + PartialEq + core::fmt::Debug>(
 
 #[test]
 fn every_kind_is_read_as_it_was_stored_and_says_what_it_is() {
-    check_stored(&record("A"), "linear_error_table", "2 nodes");
+    check_stored(&record("A"), "linear_error_table", "2 positions");
     check_stored(
         &rotary(),
         "rotary_error_table",

@@ -98,6 +98,11 @@ impl Endpoint {
         }
     }
 
+    /// Where somebody may speak without being known.
+    pub(super) fn terminal_fd(&self) -> Option<BorrowedFd<'_>> {
+        self.fd().filter(|_| !self.is_shared()).map(|(fd, _)| fd)
+    }
+
     /// Hands what the client has sent to the machine.
     pub(super) fn receive(&mut self, now: Time, machine: &mut Simulation) -> io::Result<()> {
         let port = self.port;
@@ -249,6 +254,14 @@ impl Endpoint {
         match &mut self.kind {
             Kind::Slcan(pty, adapter) => say_all((pty, adapter), sent, |_| true),
             Kind::Serial(..) | Kind::Vcan(_) => Ok(Answered::default()),
+        }
+    }
+
+    /// Takes no notice of what was said into a terminal; how many bytes that was.
+    pub(super) fn drop_heard(&mut self) -> io::Result<usize> {
+        match &mut self.kind {
+            Kind::Serial(Some(pty), _) | Kind::Slcan(Some(pty), _) => pty.drop_heard(),
+            Kind::Serial(None, _) | Kind::Slcan(None, _) | Kind::Vcan(_) => Ok(0),
         }
     }
 

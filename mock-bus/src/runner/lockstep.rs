@@ -45,6 +45,8 @@ pub(super) struct Lockstep {
     allowed: Option<CpuSet>,
     patience: Duration,
     outlive: bool,
+    /// Whether it was told that somebody does not keep the clock.
+    has_told_of_strangers: bool,
 }
 
 impl Lockstep {
@@ -55,6 +57,7 @@ impl Lockstep {
             site,
             patience,
             outlive,
+            has_told_of_strangers: false,
             allowed: sched_getaffinity(OWN).ok(),
         }
     }
@@ -307,6 +310,11 @@ impl Lockstep {
         let unsent = self.site.endpoints.iter().filter_map(Endpoint::fd);
         let unsent = unsent.filter(|(_, unsent)| *unsent);
         fds.extend(unsent.map(|(fd, _)| PollFd::new(fd, PollFlags::POLLOUT)));
+        let of_strangers = fds.len();
+        if !self.is_anybody_there() {
+            let silent = self.site.endpoints.iter().filter_map(Endpoint::terminal_fd);
+            fds.extend(silent.map(|fd| PollFd::new(fd, PollFlags::POLLIN)));
+        }
         match poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS)) {
             Ok(0) => return self.complain().map(|()| false),
             Ok(_) | Err(Errno::EINTR) => {}
@@ -315,6 +323,10 @@ impl Lockstep {
         let is_woken = fds[0].any() == Some(true);
         // The door stands first among the visitors.
         let has_come = fds.get(1).is_some_and(|door| door.any() == Some(true));
+        let mut strangers = fds[of_strangers..].iter();
+        if strangers.any(|it| it.any() == Some(true)) {
+            self.ignore_strangers()?;
+        }
         if is_woken {
             let mut bytes = [0; 64];
             let _ = self.site.waker.read(&mut bytes)?;

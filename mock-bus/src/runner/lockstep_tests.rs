@@ -343,6 +343,28 @@ fn what_one_had_sent_that_was_killed_while_it_waited_is_not_taken_from_the_next_
 }
 
 #[test]
+fn what_a_program_says_that_does_not_share_the_clock_is_not_taken_for_the_next_ones() {
+    let bench = Bench::of(ON_CAN, "stranger", |_| {});
+    for _ in 0..2 {
+        let mut stranger = bench.open_terminal();
+        stranger.write_all(b"C\rV\rS8\r").unwrap();
+        drop(stranger);
+        let mut client = bench.client();
+        let welcome = client.ask("hello 1 0 me");
+        let now = welcome.strip_prefix("welcome ").unwrap();
+        let mut line = bench.open_terminal();
+        let attach = format!("attach 0 {}", bench.terminal());
+        assert_eq!(client.ask(&attach), "attached");
+        line.write_all(b"V\r").unwrap();
+        assert_eq!(client.ask("idle 900000000 0:2"), format!("go {now} 0:6"));
+        let mut version = [0; 6];
+        line.read_exact(&mut version).unwrap();
+        assert_eq!(&version, b"V1013\r");
+        client.say("bye");
+    }
+}
+
+#[test]
 fn somebody_who_hangs_is_named_and_ends_the_machine() {
     let bench = Bench::new("hangs", |options| {
         options.patience = Duration::from_millis(1);

@@ -128,6 +128,19 @@ impl Pty {
         Ok(bytes)
     }
 
+    /// Reads what has come, for nobody; how many bytes that was.
+    pub(super) fn drop_heard(&mut self) -> io::Result<usize> {
+        let (mut buffer, mut dropped) = ([0; 4096], 0);
+        loop {
+            match read(&self.master, &mut buffer) {
+                Ok(0) | Err(Errno::EAGAIN) => return Ok(dropped),
+                Ok(length) => dropped += length,
+                Err(Errno::EINTR) => {}
+                Err(errno) => return Err(errno.into()),
+            }
+        }
+    }
+
     /// Sends now what fits, and the rest at the next [`Pty::flush`]; `false` when it is lost. For a
     /// client that says itself when it waits, all waits for the flush: each piece wakes the kernel's
     /// worker for terminals, which takes longer than the writing.

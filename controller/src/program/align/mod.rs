@@ -6,7 +6,7 @@ mod lines;
 mod picture;
 
 use core::time::Duration;
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 
 use clap::Args;
 use drivers::device::Signal;
@@ -16,7 +16,7 @@ use units::Time;
 
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::output::{Ended, Output};
+use crate::program::output::{Ended, Output, printed};
 use crate::program::session::Session;
 use crate::program::span::span_of;
 use crate::volumetric::sight::{Sight, Sights, references_in_use};
@@ -138,7 +138,7 @@ impl Align {
             next = (next + every).min(end);
             self.watch(machine, next)?;
             let view = self.view(machine, started)?;
-            self.show(&view);
+            self.show(&view)?;
             if args.once || next >= end {
                 return Ok(());
             }
@@ -179,14 +179,12 @@ impl Align {
         })
     }
 
-    fn show(&mut self, view: &View) {
+    fn show(&mut self, view: &View) -> Result<(), Failure> {
         let text = match &mut self.shown {
             Shown::Picture(screen) => screen.draw(view),
             Shown::Lines if self.output.is_json() => self.output.object(&lines::value(view)) + "\n",
             Shown::Lines => format!("{}\n", lines::line(view)),
         };
-        let mut out = stdout().lock();
-        // A closed pipe (`| head`) is the reader's right, not a failure of the machine.
-        let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        printed(&mut stdout().lock(), text.as_bytes()).map(|_| ())
     }
 }

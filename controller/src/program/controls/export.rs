@@ -1,7 +1,6 @@
 //! `truestage cal export`: a calibration in the form of another control.
 
-use std::fs::File;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -19,6 +18,7 @@ use crate::linear::LinearContent;
 use crate::program::belongs::head_of;
 use crate::program::kind::of_kind;
 use crate::program::output::{Ended, Output};
+use crate::program::written::create;
 use crate::rotary::RotaryContent;
 use crate::rotary::settings::periodic_compensation;
 use crate::{Failure, linear};
@@ -137,8 +137,8 @@ fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
         path: path.to_owned(),
         source,
     };
-    match File::create_new(path) {
-        Ok(mut file) => file.write_all(text.as_bytes()).map_err(failed),
+    match create(path, text.as_bytes()) {
+        Ok(()) => Ok(()),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(Failure::Usage {
             what: format!("--out {}: this file already exists", path.display()),
             help: "it was not changed; give another name, or move it away".into(),

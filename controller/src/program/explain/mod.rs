@@ -83,28 +83,56 @@ fn explained(word: &str) -> Result<Explained, Failure> {
         }
     };
     let Some(digits) = word.strip_prefix("0x").or(word.strip_prefix("0X")) else {
-        let code = word.parse().map_err(|_| unknown())?;
-        let (meaning, advice) = exits::of(code).ok_or_else(unknown)?;
-        return Ok(Explained {
-            kind: "exit code",
-            meaning: format!("{code} ({meaning})"),
-            advice,
-        });
+        let exit = word.parse().ok().and_then(exit);
+        return exit.or_else(|| named(word)).ok_or_else(unknown);
     };
     let digits = digits.replace('_', "");
     let raw = u32::from_str_radix(&digits, 16).map_err(|_| unknown())?;
     match (digits.len(), u16::try_from(raw)) {
-        (..=4, Ok(code)) => Ok(Explained {
-            kind: "emergency or drive fault code",
-            meaning: EmergencyCode(code).to_string(),
-            advice: emergencies::of(EmergencyCode(code)),
-        }),
-        (5..=8, _) => Ok(Explained {
-            kind: "SDO abort code",
-            meaning: AbortCode::from_raw(raw).to_string(),
-            advice: aborts::of(AbortCode::from_raw(raw)),
-        }),
+        (..=4, Ok(code)) => Ok(emergency(EmergencyCode(code))),
+        (5..=8, _) => Ok(abort(AbortCode::from_raw(raw))),
         _ => Err(unknown()),
+    }
+}
+
+/// Hexadecimal digits without `0x`, as a drive's display shows them: known only where the standards name that very code,
+/// as any number could be read so.
+fn named(digits: &str) -> Option<Explained> {
+    let raw = u32::from_str_radix(digits, 16).ok()?;
+    match digits.len() {
+        4 => EmergencyCode::named()
+            .find(|it| u32::from(it.0) == raw)
+            .map(emergency),
+        8 => AbortCode::ALL
+            .iter()
+            .find(|it| **it == AbortCode::from_raw(raw))
+            .map(|it| abort(*it)),
+        _ => None,
+    }
+}
+
+fn exit(code: u8) -> Option<Explained> {
+    let (meaning, advice) = exits::of(code)?;
+    Some(Explained {
+        kind: "exit code",
+        meaning: format!("{code} ({meaning})"),
+        advice,
+    })
+}
+
+fn emergency(code: EmergencyCode) -> Explained {
+    Explained {
+        kind: "emergency or drive fault code",
+        meaning: code.to_string(),
+        advice: emergencies::of(code),
+    }
+}
+
+fn abort(code: AbortCode) -> Explained {
+    Explained {
+        kind: "SDO abort code",
+        meaning: code.to_string(),
+        advice: aborts::of(code),
     }
 }
 
@@ -124,6 +152,8 @@ mod tests {
             ("0x06090030", abort, "value out of range"),
             ("0x0609_0030", abort, "value out of range"),
             ("0X8611", emergency, "following error"),
+            ("8611", emergency, "following error"),
+            ("06090030", abort, "value out of range"),
             ("0x2311", emergency, "current"),
             ("4", exit, "device or bus"),
             ("130", exit, "Ctrl-C"),
@@ -132,7 +162,18 @@ mod tests {
             assert_eq!(seen, expected, "{word}");
             assert!(meaning.contains(says), "{meaning}");
         }
-        for word in ["", "0x", "0x123456789", "-1", "77", "four", "0xzz"] {
+        for word in [
+            "",
+            "0x",
+            "0x123456789",
+            "-1",
+            "77",
+            "1234",
+            "face",
+            "+611",
+            "four",
+            "0xzz",
+        ] {
             let told = kind(word).expect_err(word).to_string();
             assert!(told.contains("is no code"), "{told}");
         }

@@ -9,15 +9,15 @@ mod shape;
 mod table;
 mod thrift;
 
-use std::fs::File;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::Failure;
-use crate::program::output::{Ended, Output};
+use crate::program::output::{Ended, Output, printed};
+use crate::program::written::create;
 use csv_text::csv_of;
 use entries::{Entry, entries_of};
 use mcap::mcap_of;
@@ -135,15 +135,6 @@ fn export(args: &ExportArgs, output: Output) -> Ended {
     }
 }
 
-/// Writes `bytes` to `out`, all of them.
-fn printed(out: &mut impl io::Write, bytes: &[u8]) -> Result<(), Failure> {
-    match out.write_all(bytes).and_then(|()| out.flush()) {
-        // A closed pipe (`| head`) is the reader's right.
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.map_err(failed(Path::new(STANDARD_OUTPUT))),
-    }
-}
-
 fn names(tables: &[Table]) -> String {
     let names: Vec<&str> = tables.iter().map(|it| it.name.as_str()).collect();
     names.join(", ")
@@ -186,7 +177,7 @@ fn as_files(args: &ExportArgs, tables: &[Table], output: Output) -> Ended {
             ExportFormat::Parquet => parquet_of(table),
             ExportFormat::Csv | ExportFormat::Mcap => csv_of(table).into_bytes(),
         };
-        create(path, &bytes)?;
+        create(path, &bytes).map_err(failed(path))?;
     }
     let each = tables.iter().zip(&paths);
     let lines = each.clone().map(|(table, path)| {
@@ -209,7 +200,7 @@ fn as_one_file(args: &ExportArgs, entries: &[Entry], output: Output) -> Ended {
     let beside = args.run.with_extension("mcap");
     let path = args.out.clone().unwrap_or(beside);
     refuse_existing(&path)?;
-    create(&path, &mcap_of(entries))?;
+    create(&path, &mcap_of(entries)).map_err(failed(&path))?;
     let text = format!("{} entries in {}", entries.len(), path.display());
     let value = json!({"journal": args.run, "entries": entries.len(), "file": path});
     output.result(&text, &value)
@@ -229,46 +220,9 @@ fn refuse_existing(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// A new file that is whole: half of one that could not be written is removed.
-fn create(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let mut file = File::create_new(path).map_err(failed(path))?;
-    let written = file.write_all(bytes);
-    if written.is_err() {
-        // The failure itself is what the operator is told.
-        let _ = std::fs::remove_file(path);
-    }
-    written.map_err(failed(path))
-}
-
 fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     move |source| Failure::File {
         path: path.to_owned(),
         source,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What takes nothing any more, for a reason.
-    struct Full(io::ErrorKind);
-
-    impl io::Write for Full {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Err(self.0.into())
-        }
-    }
-
-    #[test]
-    fn a_table_that_is_not_whole_where_it_is_printed_is_a_failure_and_a_closed_pipe_is_none() {
-        let print = |kind| printed(&mut Full(kind), b"a,b\n");
-        assert!(print(io::ErrorKind::BrokenPipe).is_ok());
-        let failure = print(io::ErrorKind::StorageFull).unwrap_err();
-        assert!(matches!(failure, Failure::File { .. }), "{failure}");
     }
 }

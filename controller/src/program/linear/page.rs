@@ -8,7 +8,7 @@ use machine::records::{ReadJournal, read_journal};
 use crate::Failure;
 use crate::linear::measure::series_of;
 use crate::linear::{LinearContent, LinearLog, PointEntry};
-use crate::program::linear::report::{self, Page, Section};
+use crate::program::linear::report::{self, CALIBRATE, Page, Section};
 use crate::program::made_from::made_from;
 
 /// The page of the journal at `path`.
@@ -35,11 +35,12 @@ pub(crate) fn section<'a>(
     let title = match (journal.header.verb.as_str(), is_corrected) {
         ("verify", true) => "as left",
         ("verify", false) => "as found",
-        ("calibrate", _) => "at the calibrated positions",
+        (CALIBRATE, _) => "at the calibrated positions",
         (other, _) => other,
     };
     Section {
         title: title.to_owned(),
+        is_calibration: journal.header.verb == CALIBRATE,
         figures,
         points: &journal.log.points,
         criterion: journal.log.criterion.as_ref(),

@@ -177,6 +177,12 @@ fn verified() -> Vec<Member> {
         ("tolerance_um", number()),
         ("within_tolerance", truth()),
         (
+            "warning",
+            text()
+                .or_null()
+                .about("That it is within its tolerance, and too uncertain to show it."),
+        ),
+        (
             "uncertainty",
             list(target).about("Of the corrected position; null where it is not stated."),
         ),

@@ -22,13 +22,15 @@ use crate::program::page::head::{Fact, facts};
 use crate::program::page::{document, escape};
 use crate::program::text;
 
-pub(crate) use self::head::head;
+pub(crate) use self::head::{CALIBRATE, head};
 
 /// One measured series on the page.
 #[derive(Clone, Debug)]
 pub(crate) struct Section<'a> {
     /// Its heading: `as found`, `as left` …
     pub(crate) title: String,
+    /// Whether a calibration is made from it, which is no test.
+    pub(crate) is_calibration: bool,
     /// Its figures.
     pub(crate) figures: &'a Figures,
     /// Its points.
@@ -93,7 +95,7 @@ fn deviations(sections: &[Section<'_>]) -> String {
     }
     for (it, extent) in sections.iter().zip(extents) {
         let _ = write!(html, "<h2>Deviation {}</h2>", escape(&it.title));
-        html += &plot(it, extent);
+        html += &plot(it, extent, "");
         html += &targets::html(it);
     }
     html
@@ -105,17 +107,18 @@ pub(crate) fn at_one_scale(sections: &[Section<'_>]) -> String {
     let all = extents.fold([0.0_f64, 0.0], |[low, high], it| {
         [low.min(it[0]), high.max(it[1])]
     });
-    let plots = sections.iter().map(|it| plot(it, all));
+    let caption = |it: &Section<'_>| format!("<figcaption>{}</figcaption>", escape(&it.title));
+    let plots = sections.iter().map(|it| plot(it, all, &caption(it)));
     format!(
         "<h2>Deviations at one scale</h2>{}",
         plots.collect::<String>()
     )
 }
 
-fn plot(section: &Section<'_>, extent: [f64; 2]) -> String {
+/// Under a heading that says whose it is it needs no `caption`.
+fn plot(section: &Section<'_>, extent: [f64; 2], caption: &str) -> String {
     format!(
-        "<figure><figcaption>{}</figcaption>{}</figure>",
-        escape(&section.title),
+        "<figure>{caption}{}</figure>",
         iso_plot::iso_plot(section, extent)
     )
 }
@@ -135,7 +138,11 @@ fn figures(sections: &[Section<'_>]) -> String {
     }
     html += "</table>";
     for section in sections {
-        if let Some(lack) = text::lack(&section.figures.conformity) {
+        let lack = match section.is_calibration {
+            true => text::no_test,
+            false => text::lack,
+        };
+        if let Some(lack) = lack(&section.figures.conformity) {
             html += &format!("<p>{}: {}</p>", escape(&section.title), escape(&lack));
         }
     }
@@ -184,5 +191,17 @@ mod tests {
         let html = render(&page);
         assert!(!html.contains("<script>"));
         assert!(html.contains("&lt;script&gt;&quot;x&quot;&amp;"));
+    }
+
+    fn page_of(golden: &str) -> String {
+        let golden = format!("{}/golden/{golden}", env!("CARGO_MANIFEST_DIR"));
+        crate::program::linear::page::html(golden.as_ref()).unwrap()
+    }
+
+    #[test]
+    fn a_picture_below_its_own_heading_has_no_caption_that_says_the_same() {
+        let html = page_of("linear_calibrate.jsonl");
+        assert!(html.contains("<h2>Deviation at the calibrated positions</h2>"));
+        assert!(!html.contains("<figcaption>"), "{html}");
     }
 }

@@ -178,13 +178,8 @@ fn moved(axis: &str, moved: &Moved, calibration: Option<&str>) -> Told {
 pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
     let title = name.replace('_', " ");
     let mut text = text::figures_table(&[(&title, &verified.figures)]);
-    let figure = verified.figures.accuracy.bidirectional;
     text += "\n";
-    text += &text::verdict(
-        &format!("A = {:.3} µm", figure.um()),
-        &format!("{:.3} µm", verified.tolerance.um()),
-        verified.is_within_tolerance(),
-    );
+    text += &verdict(verified).0;
     let uncertain = uncertainty::of_targets(&verified.uncertainty);
     text += &uncertain.map_or(String::new(), |it| format!("\n{it}"));
     text += &format!(
@@ -194,12 +189,20 @@ pub(crate) fn verified_text(name: &str, verified: &Verified) -> String {
     text + &format!("\npoints in {}", verified.journal.display())
 }
 
+fn verdict(verified: &Verified) -> (String, bool) {
+    let accuracy = verified.figures.accuracy.bidirectional;
+    uncertainty::verdict(accuracy, verified.tolerance, &verified.uncertainty)
+}
+
 pub(crate) fn verified_value(name: &str, verified: &Verified) -> Value {
+    let (verdict, is_good) = verdict(verified);
+    let is_doubtful = verified.is_within_tolerance() && !is_good;
     json!({
         name: to_json::figures(&verified.figures),
         "closure_um": verified.measured.closure.map(to_json::um),
         "tolerance_um": to_json::um(verified.tolerance),
         "within_tolerance": verified.is_within_tolerance(),
+        "warning": is_doubtful.then_some(verdict),
         "uncertainty": uncertainty::targets(&verified.uncertainty),
         "journal": verified.journal,
     })

@@ -10,6 +10,7 @@ use crate::linear::record::{BudgetRecord, CombinedRecord};
 use crate::linear::{LinearContent, UncertaintyAtTarget, ZeroEntry};
 use crate::program::budget::{AtWorst, LENGTHS, value_of};
 use crate::program::json::um;
+use crate::program::text;
 use crate::store::budget::PlaceBudgetRecord;
 
 /// Of a calibration that has no budget.
@@ -162,6 +163,23 @@ pub(crate) fn of_targets(targets: &[UncertaintyAtTarget]) -> Option<String> {
         );
     }
     Some(text)
+}
+
+/// What a verification is judged by, and whether that is good. Where the corrected position is less certain at a target
+/// than the tolerance is wide, nobody knows whether the axis is within it.
+pub(crate) fn verdict(
+    accuracy: Metres,
+    tolerance: Metres,
+    targets: &[UncertaintyAtTarget],
+) -> (String, bool) {
+    let known = targets.iter().flat_map(|it| [it.forward, it.reverse]);
+    let most = known.flatten().max_by(by_size).map(|it| it.expanded());
+    let in_um = |it: Metres| format!("{:.3} µm", it.um());
+    let figure = format!("A = {}", in_um(accuracy));
+    let told = [figure, in_um(tolerance), most.map_or(String::new(), in_um)];
+    let [figure, limit, expanded] = &told;
+    let is_beyond = most.is_some_and(|it| it > tolerance);
+    text::sure_verdict([figure, limit, expanded], accuracy <= tolerance, is_beyond)
 }
 
 /// Of a place that a calibration without a budget corrects.

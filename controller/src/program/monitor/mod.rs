@@ -8,7 +8,7 @@ mod feed;
 mod picture;
 mod words;
 
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use clap::Args;
 
 use crate::program::ServiceArgs;
 use crate::program::exchange::ask;
-use crate::program::output::{Ended, Output};
+use crate::program::output::{Ended, Output, Reader, printed};
 use crate::program::span::span_of;
 use feed::{Heard, Wanted};
 
@@ -84,9 +84,7 @@ fn lines(heard: &Receiver<Heard>, until: Instant, output: Output) -> Ended {
             Ok(Heard::Machine(_) | Heard::Axes(_) | Heard::Runs(_)) => continue,
             Err(RecvTimeoutError::Timeout) => return Ok(None),
         };
-        let mut out = stdout().lock();
-        if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
-            // A closed pipe (`| head`) is the reader's right.
+        if printed(&mut stdout().lock(), (line + "\n").as_bytes())? == Reader::Left {
             return Ok(None);
         }
     }

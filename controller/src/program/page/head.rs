@@ -241,12 +241,23 @@ fn corrections(instrument: &InstrumentRecord, others: &[Made]) -> [Fact; 2] {
     let missed = others.iter().filter(|it| !it.is_made);
     let is_missed = instrument.warning().is_some() || missed.clone().any(|it| it.is_missed);
     let mut off: Vec<String> = instrument.warning().into_iter().collect();
+    off.extend(unmentioned(instrument).map(String::from));
     off.extend(missed.map(|it| it.name.clone()));
     let off = list(off.iter().map(String::as_str).collect());
     [
         Fact::new(CORRECTED, on),
         Fact::new(NOT_CORRECTED, off).red_if(is_missed),
     ]
+}
+
+/// A dead path that is not corrected is told as switched off only where there is anything of it to correct by: of an
+/// instrument whose light the air bends, whoever reads the page must know it all the same.
+fn unmentioned(instrument: &InstrumentRecord) -> Option<&'static str> {
+    const PATH: &str = "dead path";
+    let switched_off = |name: &str| instrument.switched_off.iter().any(|it| it == name);
+    let is_in_air = instrument.air_corrected || switched_off("air");
+    let is_told = instrument.dead_path_corrected || switched_off(PATH);
+    (is_in_air && !is_told).then_some(PATH)
 }
 
 /// By what files are known again: they are named by, and can be compared with, their BLAKE3.
@@ -296,6 +307,15 @@ mod tests {
         instrument.switched_off = vec!["air".into()];
         let html = lines(&instrument, core::slice::from_ref(&table));
         let red = html.split("class=\"warning\"").nth(1).expect("a red line");
-        assert!(red.contains("NOT CORRECTED for air, error table"), "{html}");
+        assert!(
+            red.contains("NOT CORRECTED for air, dead path, error table"),
+            "{html}"
+        );
+        instrument.switched_off = vec!["dead path".into()];
+        let html = lines(&instrument, &[]);
+        assert!(
+            html.contains("<td>NOT CORRECTED for dead path</td>"),
+            "{html}"
+        );
     }
 }

@@ -1,5 +1,7 @@
 //! Who takes part in the clock, at which ports, and on which processor.
 
+use std::io;
+
 use nix::sched::{CpuSet, sched_setaffinity};
 use wire::Port;
 use wire::lockstep::{Reply, VERSION};
@@ -16,8 +18,40 @@ impl Lockstep {
                  {VERSION}"
             ));
         }
+        if let Err(error) = self.ignore_strangers() {
+            return Reply::Refused(error.to_string());
+        }
         self.site.visitors.peers[who].join(name, pid);
         Reply::Welcome(self.site.machine.now())
+    }
+
+    /// Whether anybody shares the clock.
+    pub(super) fn is_anybody_there(&self) -> bool {
+        let mut peers = self.site.visitors.peers.iter();
+        peers.any(|it| !matches!(it.doing, Doing::Nothing))
+    }
+
+    /// What a program says that does not share the clock must not be taken for the words of the next one that does: that
+    /// would wait for answers in vain, and so would all after it. Looked for before anybody joins, who has written
+    /// nothing yet.
+    pub(super) fn ignore_strangers(&mut self) -> io::Result<()> {
+        for place in 0..self.site.endpoints.len() {
+            let mut peers = self.site.visitors.peers.iter();
+            if peers.any(|it| it.ports.contains_key(&place)) {
+                continue;
+            }
+            let endpoint = &mut self.site.endpoints[place];
+            let dropped = endpoint.drop_heard()?;
+            if dropped > 0 && !self.has_told_of_strangers {
+                self.has_told_of_strangers = true;
+                eprintln!(
+                    "mock-bus: {}: a program that does not share the lockstep clock speaks there and is not answered: \
+                     run it with the --clock of this machine, or this machine without one",
+                    endpoint.name()
+                );
+            }
+        }
+        Ok(())
     }
 
     /// It has closed a port, or (with `None`) all of them.

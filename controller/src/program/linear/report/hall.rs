@@ -113,5 +113,11 @@ fn table(sweep: &HallSweepEntry) -> String {
             it.name, it.place_um, it.volts
         );
     }
-    html + "</table>"
+    html + "</table>" + POINTS
 }
+
+/// As the steps of the search define them.
+const POINTS: &str = "<p class=\"note\">G7: the highest voltage of sensor 1, whose curve is even. G1, G2: the places on \
+     its two flanks where it has one and the same lower voltage; P1, P2: sensor 2, whose curve is odd, at these places. \
+     P0: where sensor 2 has the mean of its voltages at P1 and P2; G8: sensor 1 there, which must be at its highest. The \
+     origin is refined from all readings of the search.</p>";
