@@ -3,7 +3,7 @@
 use std::fs;
 
 use machine::records::{CalibrationRecord, Lease};
-use tests::LINEAR;
+use tests::{LINEAR, UVW};
 use truestage::linear::LinearContent;
 
 use crate::programs::{check_error, text, truestage};
@@ -63,6 +63,30 @@ fn calibrations_are_listed_by_their_age_and_the_only_axis_need_not_be_named() {
     assert_eq!(text(&show().with_code(0)["id"]), ids[0]);
     let rolled = truestage(here, &["cal", "rollback", "machine.toml"]).with_code(2);
     check_error(&rolled, &["axis x: no earlier calibration", "cal list"]);
+}
+
+#[test]
+fn of_several_calibrations_in_use_each_is_named_with_what_uses_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let here = folder.path();
+    fs::write(here.join("machine.toml"), UVW.machine).expect("there is room");
+    let store = truestage::for_tests::store_in(&here.join("machine-data"), "uvw");
+    for (axis, day) in [("u", 1), ("v", 2)] {
+        let mut record = golden();
+        record.head.axis = axis.into();
+        record.head.created = format!("2026-01-0{day}T00:00:00Z");
+        let id = store.save(&record).expect("there is room");
+        store.activate(axis, &id).expect("there is room");
+    }
+    let refused = truestage(here, &["cal", "show", "machine.toml"]).with_code(2);
+    check_error(
+        &refused,
+        &[
+            "several calibrations are in use: u ",
+            ", v ",
+            "add the name",
+        ],
+    );
 }
 
 #[test]

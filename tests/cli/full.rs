@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::process::Command;
 
-use tests::LINEAR;
+use tests::{Edit, LINEAR};
 
 use crate::programs::{program, text, truestage};
 
@@ -90,7 +90,7 @@ fn what_was_stored_is_kept_where_standard_output_is_full() {
     let here = folder.path();
     calibrated(here);
     let data = fs::read_to_string(here.join("data.csv")).expect("it is there");
-    fs::write(here.join("data.csv"), data.replace(",30\n", ",30.001\n")).expect("there is room");
+    fs::write(here.join("data.csv"), data.edit(",30\n", ",30.001\n")).expect("there is room");
     check_told(
         here,
         &["fit", "linear", "data.csv", "--save", "machine.toml"],
