@@ -42,9 +42,9 @@ pub(super) fn judged(
             (judged, document) = (other, whole);
         } else if other.len() == judged.len() {
             *help = format!(
-                "write {line}, or `{} = {:?}` where the number is in that unit already",
+                "write {line}, or `{} = {}` where the number is in that unit already",
                 name_of(it),
-                it.seen
+                written_like(it.seen, &it.key, &whole)
             );
         }
     }
@@ -66,6 +66,15 @@ fn with_either(
 
 fn name_of(it: &Converted) -> &str {
     it.key.rsplit('.').next().unwrap_or_default()
+}
+
+/// A number as that key has it in the document: whole or not.
+fn written_like(number: f64, key: &str, document: &Table) -> String {
+    let mut document = document.clone();
+    match value_at(&mut document, key) {
+        Some(Value::Integer(_)) if number.fract() == 0.0 => format!("{number:.0}"),
+        _ => format!("{number:?}"),
+    }
 }
 
 /// The key with its number in the document.

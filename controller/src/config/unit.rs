@@ -78,7 +78,9 @@ pub(super) fn converted(number: &str, unit: &str, key: &str) -> Option<String> {
     let unit = unit.replace('²', "2").replace('³', "3").replace('^', "");
     let written = size(&unit)?;
     // A share has no unit.
-    let wanted = unit_of(key).or_else(|| (unit == "%").then(|| ("share".to_owned(), 1.0)))?;
+    let is_temperature = ["_c", "_k", "_kelvin"].iter().any(|it| key.ends_with(it));
+    let is_share = unit == "%" && !is_temperature;
+    let wanted = unit_of(key).or_else(|| is_share.then(|| ("share".to_owned(), 1.0)))?;
     if written.0 != wanted.0 {
         return None;
     }
@@ -158,6 +160,7 @@ mod tests {
             ("1", "deg", "reach_arcsec", Some("3600.0")),
             ("5", "ms", "speed_mm_per_s", None),
             ("5", "mm", "samples", None),
+            ("10", "%", "low_c", None),
         ] {
             assert_eq!(
                 converted(number, unit, key).as_deref(),

@@ -207,6 +207,10 @@ fn check_zero_search(judge: &mut Judge<'_>, axis: &AxisConfig, zero: &ZeroConfig
             SettingsError::Order { small, large, .. } => {
                 in_keys(&format!("lower {small}, or raise {large}"))
             }
+            SettingsError::BandTooNarrow { noise, .. } => format!(
+                "give at least {}, or lower noise_mv",
+                Short(noise.value() * 3e3)
+            ),
             _ => "change one of them".to_owned(),
         };
         judge.say(key_of(&error), cause, help);

@@ -90,7 +90,7 @@ impl Corrected {
 }
 
 /// Places that differ by less are one.
-const ROUNDING: Metres = Metres(1e-9);
+pub(super) const ROUNDING: Metres = Metres(1e-9);
 
 /// A move that may be begun.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use compensator::budget::Combined;
 use compensator::error_table::{Compensation, ErrorTable};
 use compensator::iso230::{self, Figures};
-use units::{Approach, Metres};
+use units::{Approach, Metres, Short};
 
 use crate::failure::{Failure, in_use_text};
 use crate::linear::calibrate::open_journal;
+use crate::linear::course::ROUNDING;
 use crate::linear::measure::{MeasureOptions, Measured, series_of};
 use crate::linear::memory::Untried;
 use crate::linear::on_trial::NewIsWorse;
@@ -113,6 +114,9 @@ impl LinearStage<'_> {
             });
         }
         let plan = of_verification(&config, scale_limit_ppm);
+        if options.compensated {
+            self.require_calibrated(&plan.targets)?;
+        }
         // Before the header, which says who measures.
         self.core.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", &plan, options.calibration.clone());
@@ -149,6 +153,29 @@ impl LinearStage<'_> {
                 .inspect_err(|failure| note_failure(&mut journal, failure))?;
         }
         Ok(verified)
+    }
+
+    /// Beyond what is calibrated a verification would judge what nobody measured, and blame the calibration.
+    fn require_calibrated(&self, targets: &[Metres]) -> Result<(), Failure> {
+        let Some(table) = self.compensation() else {
+            return Ok(());
+        };
+        let (first, last) = table.table().range();
+        // Steps add up to their end but for rounding.
+        let reach = first - ROUNDING..=last + ROUNDING;
+        let Some(beyond) = targets.iter().find(|it| !reach.contains(it)) else {
+            return Ok(());
+        };
+        Err(Failure::Usage {
+            what: format!(
+                "axis {} is to be verified at {} mm, and is calibrated from {} to {} mm; nothing was moved",
+                self.axis,
+                Short(beyond.mm()),
+                Short(first.mm()),
+                Short(last.mm())
+            ),
+            help: "verify within that ([axis.….verify]), calibrate as far, or verify without it: --uncompensated".into(),
+        })
     }
 
     fn at_target(&self, target: Metres) -> UncertaintyAtTarget {

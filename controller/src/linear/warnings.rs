@@ -188,6 +188,7 @@ fn check_between(judge: &mut Judge<'_>, axis: &AxisConfig) {
     let [Some(calibrated), Some(verified)] = plans else {
         return;
     };
+    check_beyond(judge, &calibrated.targets, &verified.targets);
     let same = verified.targets.iter();
     let same = same.filter(|it| is_calibrated(&calibrated, **it)).count();
     let all = verified.targets.len();
@@ -196,6 +197,30 @@ fn check_between(judge: &mut Judge<'_>, axis: &AxisConfig) {
             "verify.start_mm",
             format!("{same} of {all} targets are calibrated positions: what is wrong between them does not show"),
             "begin half a step beside a calibrated position, or take another number of targets",
+        );
+    }
+}
+
+/// What is verified must have been calibrated.
+fn check_beyond(judge: &mut Judge<'_>, calibrated: &[Metres], verified: &[Metres]) {
+    let ends = |it: &[Metres]| Some((*it.first()?, *it.last()?));
+    let (Some((first, last)), Some((start, end))) = (ends(calibrated), ends(verified)) else {
+        return;
+    };
+    let beyond = verified.iter().filter(|it| !(first..=last).contains(*it));
+    let beyond = beyond.count();
+    if beyond > 0 {
+        judge.say(
+            if end > last { "verify.end_mm" } else { "verify.start_mm" },
+            format!(
+                "{beyond} of {} targets, {} to {} mm, lie beyond what is calibrated, {} to {} mm: nothing is known there",
+                verified.len(),
+                Short(start.mm()),
+                Short(end.mm()),
+                Short(first.mm()),
+                Short(last.mm())
+            ),
+            "verify within what is calibrated, or calibrate as far",
         );
     }
 }
@@ -318,6 +343,13 @@ mod tests {
         ];
         let says = "8 of 8 targets are calibrated positions";
         check(LINEAR, &edits, &["axis.x.verify.start_mm"], says);
+    }
+
+    #[test]
+    fn a_verification_beyond_what_is_calibrated_is_told() {
+        let edits = [("end_mm = 60.0", "end_mm = 30.0")];
+        let says = "4 of 8 targets, 1.7 to 58.7 mm, lie beyond what is calibrated, 0 to 30 mm";
+        check(LINEAR, &edits, &["axis.x.verify.end_mm"], says);
     }
 
     #[test]

@@ -245,7 +245,8 @@ fn check_placements(judge: &mut Judge<'_>, run: &RotaryCalibrateConfig) -> Optio
             } else {
                 "placements"
             };
-            judge.say(key, error.to_string(), "see `truestage plan rotary --help`");
+            let help = "give two or more, fewer than `lines`; `truestage plan rotary` shows what each arrangement gives";
+            judge.say(key, error.to_string(), help);
             None
         }
     }

@@ -162,6 +162,11 @@ pub(in crate::config) fn of_schema(line: &str, schema: &Schema) -> Option<Slip> 
         true => format!("sections are {}, and those in them", known.join(", ")),
         false => "remove it, or begin it with #".to_owned(),
     };
+    if heading.line == "[]" {
+        // What stands below it goes on with the section above.
+        let help = format!("remove it, or write a name in it: {help}");
+        return Some(Slip::new(heading.at, cause, help, Some(String::new())));
+    }
     let is_lost_heading = heading.line.starts_with('[');
     Some(Slip {
         is_lost_heading,

@@ -286,11 +286,7 @@ fn inches(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let cause = format!("`{}` is no number as it is written here", shown(value));
     let help =
         format!("write {millimetres} where `\"` means inches, or {number} where it is a slip");
-    let slip = parts.value_meant(number, cause, help)?;
-    Some(Slip {
-        is_ambiguous: true,
-        ..slip
-    })
+    parts.value_meant(number, cause, help)
 }
 
 /// What stands behind the second mark is no part of the text: a remark, or a letter too many.

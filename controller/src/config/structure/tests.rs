@@ -100,7 +100,7 @@ fn a_mistyped_key_is_told_once_with_the_one_that_was_meant() {
         let help = format!("did you mean `{from}`?");
         check(LINEAR, from, to, &key, ["no such key here", &help]);
     }
-    let says = ["no such key here", "known here: "];
+    let says = ["no such key here", "known here, and not given yet: "];
     check(
         LINEAR,
         "[can.can0]",

@@ -87,6 +87,7 @@ pub(super) fn unknown<'a>(
         to: to.to_owned(),
     };
     // A key of a section that is not there is no other one that was mistyped.
+    let home = home.filter(|_| lacks.is_none());
     let is_looked_for = lacks.is_none() && !is_long;
     let lost = is_looked_for.then(|| places::lost((schema, found.document), (path, name)));
     let lost = lost.flatten();
@@ -276,6 +277,9 @@ fn advice(meant: Option<&str>, free: &[&str]) -> String {
     match meant {
         Some(key) => format!("did you mean `{key}`? A key's ending is its unit"),
         None if free.is_empty() => "remove it: every key of this section is there".into(),
-        None => format!("known here: {}", free.join(", ")),
+        None => format!(
+            "remove it; known here, and not given yet: {}",
+            free.join(", ")
+        ),
     }
 }

@@ -74,6 +74,33 @@ fn a_section_that_is_there_twice_may_be_that_of_another_name_which_has_only_part
 }
 
 #[test]
+fn a_section_under_the_name_of_its_neighbour_is_known_by_its_keys() {
+    for (right, wrong) in [
+        ("axis.x.identity", "axis.x.zero"),
+        ("axis.x.zero", "axis.x.identity"),
+        ("axis.x.verify", "axis.x.compensation"),
+    ] {
+        let text = LINEAR.edit(&format!("[{right}]\n"), &format!("[{wrong}]\n"));
+        let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+            panic!("it stands there twice")
+        };
+        assert_eq!(findings.len(), 1, "{right}: {findings:#?}");
+        let says = format!("write [{right}] ");
+        assert!(findings[0].help.starts_with(&says), "{findings:#?}");
+    }
+}
+
+#[test]
+fn brackets_without_a_name_lose_no_key() {
+    let text = LINEAR.edit("soft_min_mm = -3.0", "[]\nsoft_min_mm = -3.0");
+    let Err(ConfigError::Invalid { findings }) = parse(&text, "m.toml") else {
+        panic!("it is no section")
+    };
+    assert_eq!(findings.len(), 1, "{findings:#?}");
+    assert!(findings[0].help.starts_with("remove it"), "{findings:#?}");
+}
+
+#[test]
 fn a_key_that_is_called_like_a_section_is_named_with_both_places() {
     let header = LINEAR.lines().position(|it| it == "[axis.x]");
     let header = header.expect("it is there") + 1;

@@ -8,7 +8,8 @@ use toml::de::DeTable;
 use super::{Recovered, TOLD_MAX, is_header, name_of};
 use crate::config::diagnostic::{Diagnostic, shown};
 use crate::config::lines::below;
-use crate::config::wanted::is_list;
+use crate::config::place::is_of_key;
+use crate::config::wanted::{Wanted, is_list};
 
 /// Tells each, and leaves it out of `lines`, each of which is TOML by itself.
 pub(super) fn take_out(
@@ -34,9 +35,11 @@ pub(super) fn take_out(
             + 1;
         let place = Place::at(lines, number);
         let is_again = has_begun_again(lines, number, &place);
+        let lacking = place.is_section().then(|| place.lacking(schema));
+        let lacking = lacking.flatten();
         let (cause, help) = match is_again {
             true => again(&place),
-            false => place.told(),
+            false => place.told(lacking.as_ref()),
         };
         let name = name_of(place.line);
         let help = match place.is_section() && is_list(schema, name) {
@@ -44,8 +47,6 @@ pub(super) fn take_out(
             false => help,
         };
         found.contested.push(place.key());
-        let lacking = place.is_section().then(|| place.lacking(name));
-        let lacking = lacking.flatten();
         // Which of the two was meant to be the missing one nobody knows.
         found.has_lost_heading |= lacking.is_some();
         found.findings.push(Diagnostic {
@@ -59,7 +60,7 @@ pub(super) fn take_out(
         let is_section = place.is_section();
         match lacking {
             // Its keys are judged there, whichever it is.
-            Some(other) => lines[number] = format!("[{other}]"),
+            Some(other) => lines[other.line] = format!("[{}]", other.name),
             None => leave_out(lines, number, is_section || is_again),
         }
         // A file with more of them was pasted together: what follows would take long, and say nothing new.
@@ -72,14 +73,14 @@ pub(super) fn take_out(
 
 /// Whether the next key of the section, too, stands there a second time: it is another section's that lacks its name.
 fn has_begun_again(lines: &[String], number: usize, place: &Place<'_>) -> bool {
-    if place.is_section() || place.twice().is_none() {
+    if place.is_section() || place.twice(None).is_none() {
         return false;
     }
     let rest = lines.iter().enumerate().skip(number + 1);
     let mut next = rest.filter(|(_, it)| !it.trim().is_empty() && !it.trim().starts_with('#'));
     next.next().is_some_and(|(at, line)| {
         let next = Place::at(lines, at);
-        !is_header(line) && next.twice().is_some()
+        !is_header(line) && next.twice(None).is_some()
     })
 }
 
@@ -101,6 +102,32 @@ fn leave_out(lines: &mut [String], number: usize, is_section: bool) {
             return;
         }
         line.clear();
+    }
+}
+
+/// A section that is missing where another one stands twice.
+struct Lacking {
+    name: String,
+    /// Of the one that has its place, from 0.
+    line: usize,
+    /// Whether that has its keys, too.
+    by_keys: bool,
+}
+
+impl Lacking {
+    /// What to do, told on line `here`.
+    fn help(&self, here: usize) -> String {
+        let name = &self.name;
+        match (self.by_keys, self.line == here) {
+            (false, _) => format!("did you mean [{name}] by one of them? It is missing"),
+            (true, true) => {
+                format!("write [{name}] here: it is missing, and the keys below are its own")
+            }
+            (true, false) => format!(
+                "write [{name}] on line {}: it is missing, and the keys there are its own",
+                self.line + 1
+            ),
+        }
     }
 }
 
@@ -142,8 +169,8 @@ impl<'a> Place<'a> {
     }
 
     /// What is wrong, and what to do.
-    fn told(&self) -> (String, String) {
-        let told = self.twice().or_else(|| self.key_and_section());
+    fn told(&self, lacking: Option<&Lacking>) -> (String, String) {
+        let told = self.twice(lacking).or_else(|| self.key_and_section());
         told.unwrap_or_else(|| {
             let cause = format!("`{}` goes on with what has ended before", shown(self.line));
             let help = "write all keys of a section below one line with its name in brackets";
@@ -156,7 +183,7 @@ impl<'a> Place<'a> {
     }
 
     /// Where the same key, or the same section, stands before.
-    fn twice(&self) -> Option<(String, String)> {
+    fn twice(&self, lacking: Option<&Lacking>) -> Option<(String, String)> {
         let is_section = self.is_section();
         let wanted = match is_section {
             true => name_of(self.line),
@@ -194,12 +221,10 @@ impl<'a> Place<'a> {
         let what = if is_section { "the section" } else { "the key" };
         let cause = format!("{what} stands here a second time; line {number} has it first");
         let help = match is_section {
-            true => match self.lacking(wanted) {
-                Some(other) => {
-                    format!("did you mean [{other}] by one of them? It is missing")
-                }
-                None => "leave one of them out".to_owned(),
-            },
+            true => lacking.map_or_else(
+                || "leave one of them out".to_owned(),
+                |it| it.help(self.number),
+            ),
             false => {
                 "leave one of them out, or write the section's name that is missing between them"
                     .to_owned()
@@ -208,18 +233,36 @@ impl<'a> Place<'a> {
         Some((cause, help))
     }
 
+    /// The section that is missing where this one stands twice.
+    fn lacking(&self, schema: &Schema) -> Option<Lacking> {
+        let section = name_of(self.line);
+        let by_name = || {
+            let name = self.by_name(section, schema)?;
+            let line = self.number;
+            Some(Lacking {
+                name,
+                line,
+                by_keys: false,
+            })
+        };
+        self.by_keys(section, schema).or_else(by_name)
+    }
+
+    fn headers(&self) -> impl Iterator<Item = &'a str> {
+        let lines = self.lines.iter().map(|it| it.trim());
+        lines.filter(|it| is_header(it)).map(name_of)
+    }
+
     /// `axis.y.zero` where `axis.x.zero` stands twice, and only `y` has none; `axis.y` where that has only sections.
-    fn lacking(&self, section: &str) -> Option<String> {
+    fn by_name(&self, section: &str, schema: &Schema) -> Option<String> {
         let (group, rest) = section.split_once('.')?;
+        // Of sections that nobody names each is another one.
+        if !schema["properties"][group]["properties"].is_null() {
+            return None;
+        }
         let part = rest.split_once('.').map_or("", |it| it.1);
-        let headers = self
-            .lines
-            .iter()
-            .map(|it| it.trim())
-            .filter(|it| is_header(it));
-        let names = headers
-            .map(name_of)
-            .filter_map(|it| it.strip_prefix(group)?.strip_prefix('.'));
+        let names = self.headers();
+        let names = names.filter_map(|it| it.strip_prefix(group)?.strip_prefix('.'));
         let mut each: BTreeMap<&str, bool> = BTreeMap::new();
         for it in names {
             let (name, own) = it.split_once('.').unwrap_or((it, ""));
@@ -231,6 +274,46 @@ impl<'a> Place<'a> {
             (Some(one), None) => Some(below(&below(group, one), part)),
             _ => None,
         }
+    }
+
+    /// The only section beside it that is not there and has all keys of one of the two, which it has not itself.
+    fn by_keys(&self, section: &str, schema: &Schema) -> Option<Lacking> {
+        let (around, _) = section.rsplit_once('.')?;
+        let first = self
+            .before()
+            .position(|it| is_header(it) && name_of(it) == section);
+        let both = [Some(self.number), first].into_iter().flatten();
+        let own = Wanted::at(schema, section);
+        let parts = Wanted::at(schema, around).keys();
+        for line in both {
+            let keys = self.keys_below(line);
+            if keys.is_empty() || keys.iter().all(|it| own.has(it)) {
+                continue;
+            }
+            let others = parts.iter().map(|it| below(around, it));
+            let mut others = others.filter(|it| {
+                let wanted = Wanted::at(schema, it);
+                let has_all = keys.iter().all(|key| wanted.has(key));
+                has_all && !self.headers().any(|header| header == it)
+            });
+            if let (Some(name), None) = (others.next(), others.next()) {
+                return Some(Lacking {
+                    name,
+                    line,
+                    by_keys: true,
+                });
+            }
+        }
+        None
+    }
+
+    /// The keys of the section that begins on that line.
+    fn keys_below(&self, line: usize) -> Vec<&'a str> {
+        let rest = self.lines[line + 1..].iter().map(|it| it.trim());
+        let own = rest.take_while(|it| !is_header(it));
+        let keys = own.filter_map(|it| Some(it.split_once('=')?.0.trim()));
+        keys.filter(|it| !it.is_empty() && it.chars().all(is_of_key))
+            .collect()
     }
 
     /// Where a key has the name that a section has here, or the other way round.
