@@ -301,19 +301,8 @@ fn missing(path: &str, key: &str, schema: &Schema, found: &mut Found<'_>) {
 }
 
 fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
-    let of_sections = schema["items"]["properties"].is_object();
-    if of_sections && !items.is_empty() && !items.iter().any(Value::is_table) {
-        let cause = format!(
-            "expected sections here, this is a list of {}",
-            kind(&items[0])
-        );
-        let help = format!("write each below a line `[[{path}]]`");
+    if let Some((cause, help)) = otherwise(path, items, schema, found) {
         return say(found, path, cause, help);
-    }
-    if let Some(flat) = flattened(items, schema) {
-        found.replace(path, Some(Value::Array(flat.clone())));
-        let help = format!("write it with one pair of brackets: {}", Value::Array(flat));
-        return say(found, path, "a list in a list".to_owned(), help);
     }
     let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
     let count = items.len() as u64;
@@ -374,6 +363,28 @@ fn array(path: &str, items: &[Value], schema: &Schema, found: &mut Found<'_>) {
             number(&own, seen, schema, found);
         }
     }
+}
+
+/// What is told of a list that is one of something else, or of lists.
+fn otherwise(
+    path: &str,
+    items: &[Value],
+    schema: &Schema,
+    found: &mut Found<'_>,
+) -> Option<(String, String)> {
+    let of_sections = schema["items"]["properties"].is_object();
+    if of_sections && !items.is_empty() && !items.iter().any(Value::is_table) {
+        let cause = format!(
+            "expected sections here, this is a list of {}",
+            kind(&items[0])
+        );
+        let help = format!("write each below a line `[[{path}]]`");
+        return Some((cause, help));
+    }
+    let flat = Value::Array(flattened(items, schema)?);
+    let help = format!("write it with one pair of brackets: {flat}");
+    found.replace(path, Some(flat));
+    Some(("a list in a list".to_owned(), help))
 }
 
 /// `[[0], [1]]` and `[[0, 1]]` as one list, where that is what was meant.

@@ -528,13 +528,6 @@ mod tests {
             &format!("{slider}.intensity_max_v"),
             "greater than intensity_min_v",
         );
-        let end = ".beam.x.end_mm";
-        check(
-            "end_mm = 600.0\n",
-            "end_mm = -100.0\n",
-            end,
-            "begins at -100 mm",
-        );
         let key = format!("{slider}.age_max_ms");
         check(
             "age_max_ms = 100.0",
@@ -610,6 +603,12 @@ mod tests {
             ".bend.0.gradient_max_k",
             "0",
         );
+    }
+
+    #[test]
+    fn a_beam_ends_elsewhere_than_it_begins() {
+        let (from, to) = ("end_mm = 600.0\n", "end_mm = -100.0\n");
+        check(from, to, ".beam.x.end_mm", "begins at -100 mm");
     }
 
     #[test]

@@ -85,42 +85,7 @@ pub(super) const fn kind(value: &Value) -> &'static str {
 /// What to write instead of a value of `key` that stands in the file as `written`.
 pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &str)) -> String {
     match (expected, value) {
-        ("number" | "integer", Value::String(text)) => {
-            let is_strange = split_unit(text.trim())
-                .and_then(|it| it.1)
-                .is_some_and(|unit| unit::is_another(unit, key));
-            match (in_other_unit(text, key), number_in(text)) {
-                _ if is_strange => format!(
-                    "give {} in the unit that the key ends with, without quotes and unit",
-                    in_words(expected)
-                ),
-                (Some(number), _)
-                    if expected == "integer" && !number.ends_with(".0") && number.contains('.') =>
-                {
-                    format!("give {}", in_words(expected))
-                }
-                (Some(number), _) => {
-                    let number = match expected {
-                        "integer" => without_decimals(number),
-                        _ => number,
-                    };
-                    format!("write {number}, which is {text} in the key's unit")
-                }
-                (None, Some(number)) if number == text => {
-                    let number = match expected {
-                        "integer" => without_decimals(number.to_owned()),
-                        _ => number.to_owned(),
-                    };
-                    format!("write it without quotes: {number}")
-                }
-                (None, Some(number)) => {
-                    format!(
-                        "write it without quotes and unit: {number}; a key's ending is its unit"
-                    )
-                }
-                (None, None) => format!("give {}", in_words(expected)),
-            }
-        }
+        ("number" | "integer", Value::String(text)) => number_written(expected, text, key),
         ("boolean", Value::String(text)) => match truth(text) {
             Some(it) => format!("write it without quotes: {it}"),
             None => "give true or false".into(),
@@ -160,6 +125,42 @@ pub(super) fn correction(expected: &str, value: &Value, (key, written): (&str, &
         },
         ("object", _) => "write its keys below a line with its name in brackets: [section]".into(),
         _ => format!("give {}", in_words(expected)),
+    }
+}
+
+/// What to write in place of a text where a number is wanted.
+fn number_written(expected: &str, text: &str, key: &str) -> String {
+    let is_strange = split_unit(text.trim())
+        .and_then(|it| it.1)
+        .is_some_and(|unit| unit::is_another(unit, key));
+    match (in_other_unit(text, key), number_in(text)) {
+        _ if is_strange => format!(
+            "give {} in the unit that the key ends with, without quotes and unit",
+            in_words(expected)
+        ),
+        (Some(number), _)
+            if expected == "integer" && !number.ends_with(".0") && number.contains('.') =>
+        {
+            format!("give {}", in_words(expected))
+        }
+        (Some(number), _) => {
+            let number = match expected {
+                "integer" => without_decimals(number),
+                _ => number,
+            };
+            format!("write {number}, which is {text} in the key's unit")
+        }
+        (None, Some(number)) if number == text => {
+            let number = match expected {
+                "integer" => without_decimals(number.to_owned()),
+                _ => number.to_owned(),
+            };
+            format!("write it without quotes: {number}")
+        }
+        (None, Some(number)) => {
+            format!("write it without quotes and unit: {number}; a key's ending is its unit")
+        }
+        (None, None) => format!("give {}", in_words(expected)),
     }
 }
 
