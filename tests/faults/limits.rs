@@ -5,6 +5,7 @@ use machine::records::CalibrationRecord;
 use machine::records::Store;
 use mock_bus::fault::{Fault, FaultConfig};
 use tests::Bench;
+use tests::seeds;
 use truestage::CalibrateOptions;
 use truestage::linear::LinearContent;
 use truestage::linear::VerifyOptions;
@@ -218,20 +219,25 @@ fn a_calibration_with_the_wrong_sign_is_found_out_and_the_one_before_is_used_aga
 /// Whatever the means of its few runs are, and however good the calibration is.
 #[test]
 fn a_stage_that_shakes_is_no_reason_to_give_up_a_calibration() {
-    for seed in 1..=12 {
+    for seed in seeds("1..12") {
         let (mut bench, _, good) = calibrated(seed);
         let store = bench.store.clone();
         // It proves itself first: one that is new may be given up.
         verify(&mut bench.machine, &store).unwrap();
         let shakes = Fault::Vibration {
-            amplitude_um: 5.0 * seed as f64,
+            amplitude_um: 5.0 * (seed % 12 + 1) as f64,
         };
         let mut emulated = bench.emulated.simulation_mut();
         let injected = emulated.inject(FaultConfig::permanent(shakes));
         injected.expect("the machine can shake");
         drop(emulated);
         let verified = verify(&mut bench.machine, &store);
-        assert!(verified.is_ok(), "seed {seed}: {verified:?}");
+        // So much may look like another scale, too; which is no reason either.
+        let is_blamed = matches!(
+            verified,
+            Err(Failure::MadeWorse { .. } | Failure::NewIsWorse(_))
+        );
+        assert!(!is_blamed, "seed {seed}: {verified:?}");
         let active = store.active("x").unwrap().current;
         assert_eq!(active.as_deref(), Some(good.as_str()), "seed {seed}");
     }

@@ -285,7 +285,10 @@ fn check_arrangement(judge: &mut Judge<'_>, config: &MachineConfig, platform: &P
     let held = match kinematics(platform, config) {
         Ok(held) => held,
         Err(error) => {
-            let help = "check point_mm and direction of each [[platform.actuator]]";
+            let help = match platform.actuator.len() {
+                ..3 => "add [[platform.actuator]] sections, until there are three",
+                _ => "check point_mm and direction of each [[platform.actuator]]",
+            };
             judge.say("actuator", error.to_string(), help);
             return;
         }

@@ -2,6 +2,7 @@
 
 use mock_bus::fault::{Fault, FaultConfig};
 use serde_json::{Value, json};
+use tests::seeds;
 use tests::{Bench, UVW};
 use truestage::platform::ScrewContent;
 use truestage::{CalibrateOptions, Failure};
@@ -79,7 +80,7 @@ fn screws_that_make_it_worse_are_found_out_and_those_before_are_used_again() {
 /// Whatever its few pictures show, and however good its calibrations are.
 #[test]
 fn a_platform_that_shakes_keeps_its_calibrations() {
-    for seed in 1..=8 {
+    for seed in seeds("1..8") {
         let mut bench = zeroed(seed);
         let store = bench.store.clone();
         let mut platform = bench.machine.platform().expect("it is one");

@@ -54,6 +54,7 @@ fn numbers_say_how_they_are_written() {
         None,
     );
     check("x = NaN", "`NaN` is no value here", "give a value", None);
+    check("x = ...", "`...` is no value here", "give a value", None);
 }
 
 #[test]

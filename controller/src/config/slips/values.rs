@@ -126,8 +126,10 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         None => ("", value.trim_start_matches('+')),
     };
     let is_of_number = |it: char| it.is_ascii_digit() || ".'_ ".contains(it);
+    // `...` is a place that somebody left open.
+    let has_digits = rest.contains(|it: char| it.is_ascii_digit());
     if !rest.starts_with(|it: char| it.is_ascii_digit() || it == '.')
-        || !rest.chars().all(is_of_number)
+        || !(has_digits && rest.chars().all(is_of_number))
     {
         return None;
     }
@@ -140,7 +142,7 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         return None;
     }
     let digits: String = rest.chars().filter(|it| !"'_ ".contains(*it)).collect();
-    if digits.matches('.').count() > 1 || !digits.chars().any(|it| it.is_ascii_digit()) {
+    if digits.matches('.').count() > 1 {
         let help = "give one number, with one point before its decimals";
         return Some(Slip::new(parts.value_at, cause, help.into(), None));
     }
@@ -315,7 +317,7 @@ fn word(parts: &Parts<'_>, value: &str) -> Option<Slip> {
         "true" | "yes" | "on" => ("true".to_owned(), false),
         "false" | "no" | "off" => ("false".to_owned(), false),
         "null" | "nil" | "none" | "undefined" | "n/a" | "nan" | "inf" | "infinity" | "?"
-        | "todo" | "tbd" => {
+        | "todo" | "tbd" | "..." | "…" | "-" | "--" | "xxx" => {
             let cause = format!("`{value}` is no value here");
             let help = "give a value; a key that may be left out is left out with its name";
             return Some(Slip::new(parts.value_at, cause, help.into(), None));
