@@ -128,9 +128,8 @@ fn number(parts: &Parts<'_>, value: &str) -> Option<Slip> {
     let is_of_number = |it: char| it.is_ascii_digit() || ".'_ ".contains(it);
     // `...` is a place that somebody left open.
     let has_digits = rest.contains(|it: char| it.is_ascii_digit());
-    if !rest.starts_with(|it: char| it.is_ascii_digit() || it == '.')
-        || !(has_digits && rest.chars().all(is_of_number))
-    {
+    let begins = rest.starts_with(|it: char| it.is_ascii_digit() || it == '.');
+    if !(begins && has_digits && rest.chars().all(is_of_number)) {
         return None;
     }
     // Spaces part thousands; the same number twice was pasted twice.

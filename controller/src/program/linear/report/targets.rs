@@ -10,7 +10,8 @@ use crate::linear::CriterionEntry;
 
 /// A row for each target; `criterion` says how uncertain the corrected position is, which only a verification states.
 pub(super) fn html(section: &Section<'_>) -> String {
-    let uncertain = match section.criterion {
+    let criterion = section.criterion.filter(|it| !it.targets.is_empty());
+    let uncertain = match criterion {
         Some(_) => "<th>U ↑, k = 2 (µm)</th><th>U ↓, k = 2 (µm)</th>",
         None => "",
     };
@@ -31,7 +32,7 @@ pub(super) fn html(section: &Section<'_>) -> String {
         for figure in figures {
             let _ = write!(html, "<td>{:.3}</td>", figure.um());
         }
-        if let Some(criterion) = section.criterion {
+        if let Some(criterion) = criterion {
             let [up, down] = expanded(criterion, it.target);
             let _ = write!(html, "<td>{up}</td><td>{down}</td>");
         }
