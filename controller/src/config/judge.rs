@@ -49,13 +49,9 @@ impl<'a> Judge<'a> {
         cause: impl Into<String>,
         help: impl Into<String>,
     ) {
-        let key = self.path(key);
-        if !self.findings.iter().any(|it| it.key == key) {
-            self.findings.push(Finding {
-                key,
-                cause: cause.into(),
-                help: help.into(),
-            });
+        let path = self.path(key);
+        if !self.findings.iter().any(|it| it.key == path) {
+            self.say(key, cause, help);
         }
     }
 

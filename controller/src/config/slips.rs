@@ -200,6 +200,10 @@ pub(super) fn comment_at(line: &str) -> usize {
     }
 }
 
+/// What to do where two versions were joined.
+pub(super) const KEEP_ONE: &str =
+    "keep one version, and remove the other and the lines of <<<<<<<, ======= and >>>>>>>";
+
 /// Whether a line is a mark of a version control.
 pub(super) fn is_mark(line: &str) -> bool {
     let marks = ["<<<<<<<", "|||||||", "=======", ">>>>>>>"];
@@ -212,9 +216,8 @@ fn conflict(parts: &Parts<'_>) -> Option<Slip> {
         return None;
     }
     let cause = "two versions of the file were joined here, and nobody chose between them";
-    let help =
-        "keep one version, and remove the other and the lines of <<<<<<<, ======= and >>>>>>>";
-    Some(Slip::new(0, cause.into(), help.into(), Some(String::new())))
+    let help = KEEP_ONE.to_owned();
+    Some(Slip::new(0, cause.into(), help, Some(String::new())))
 }
 
 /// How comments begin elsewhere.

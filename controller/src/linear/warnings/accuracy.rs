@@ -266,16 +266,18 @@ mod tests {
 
     #[test]
     fn a_range_that_leaves_most_of_the_travel_out_is_told() {
+        // What is verified would lie beyond so little, which is told, too.
+        let verify = LINEAR.find("[axis.x.verify]").expect("it has one");
+        let behind = LINEAR.find("[axis.x.compensation]").expect("it comes next");
+        let calibrated = format!("{}{}", &LINEAR[..verify], &LINEAR[behind..]);
         let key = "axis.x.calibrate.end_mm";
         let edit = ("end_mm = 60.0", "end_mm = 6.0");
-        let says = "0 to 6 mm";
-        // What is verified lies beyond it then.
-        let beyond = "axis.x.verify.end_mm";
-        check(LINEAR, &[edit], &[key, beyond], says);
+        let says = "0 to 6 mm are 9 % of the travel from -3 to 63 mm";
+        check(&calibrated, &[edit], &[key], says);
         let steps = "start_mm = 0.0\nend_mm = 60.0\nstep_mm = 3.0";
         let edit = (steps, "positions_mm = [0.0, 2.0, 3.0]");
         let key = "axis.x.calibrate.positions_mm";
-        check(LINEAR, &[edit], &[key, beyond], "0 to 3 mm");
+        check(&calibrated, &[edit], &[key], "0 to 3 mm are 5 %");
         let edit = ("end_mm = 58.7", "end_mm = 7.7");
         check(LINEAR, &[edit], &["axis.x.verify.end_mm"], "1.7 to 7.7 mm");
     }
