@@ -94,7 +94,7 @@ impl Machine {
             // Why it failed must be asked before stopping it takes its time.
             let failure = self.core.explain(failure);
             self.make_safe();
-            failure
+            machine::diagnose(&mut self.core, failure)
         })
     }
 

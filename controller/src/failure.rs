@@ -82,17 +82,14 @@ pub enum Failure {
         source: Box<Failure>,
     },
     /// The axis could not follow before it had found its zero.
-    #[error(
-        "axis {axis}: could not follow before it had found its zero, and nothing has shown so far that \
-         `resolution_nm = {}` in [axis.{axis}] is right: where a count of the encoder is longer than that, the axis \
-         is sent as many times faster than it is asked to. Compare it with the encoder's data sheet; if it is right, \
-         look for what blocks or overloads the axis. {source}", units::Short(*resolution_nm)
-    )]
+    #[error("axis {axis}: {}. {source}", advice::of_start(axis, *resolution_nm, *searched))]
     BeforeZero {
         /// Which axis.
         axis: String,
         /// One count as configured, nanometres.
         resolution_nm: f64,
+        /// How far it had looked for its limit switch, where that is far.
+        searched: Option<Metres>,
         /// What its drive said.
         source: Box<Failure>,
     },
@@ -157,7 +154,7 @@ pub enum Failure {
         within: core::time::Duration,
     },
     /// A position of the error table does not fit its neighbours.
-    #[error("axis {axis}: {source}{}", advice::of_stand_off(axis, source))]
+    #[error("axis {axis}: {source}{}", advice::of_stand_off(source))]
     StandsOff {
         /// Which axis.
         axis: String,
@@ -182,9 +179,8 @@ pub enum Failure {
     #[error(
         "axis {axis}: hall zero found with a standard uncertainty of {:.4} µm, the limit is {:.4} µm; \
          a single pass over the sensors repeats to {:.4} µm. Look for noise of the sensors, vibration and a \
-         servo that overshoots; where the stage repeats no better, \
-         `standard_uncertainty_limit_um = {:.2}` would let it pass",
-        seen.um(), limit.um(), scatter.um(), seen.um() * 1.5
+         servo that overshoots",
+        seen.um(), limit.um(), scatter.um()
     )]
     ZeroUncertain {
         /// Which axis.
@@ -317,7 +313,7 @@ pub enum Failure {
         source: BudgetError,
     },
     /// The error table cannot be applied.
-    #[error("axis {axis}: {source}{}", advice::of_limit(axis, source))]
+    #[error("axis {axis}: {source}{}", advice::of_limit(source))]
     Compensation {
         /// Which axis.
         axis: String,

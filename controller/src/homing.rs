@@ -1,13 +1,13 @@
 //! What to say of a homing that did not end.
 
+use drivers::device::TRAVEL_MARGIN;
 use units::Metres;
 
 use crate::failure::Failure;
 use crate::handle::Core;
 
-/// An axis that moves this many times its configured travel without meeting a limit switch moves less than
-/// it says.
-const TRAVELS_MAX: f64 = 1.5;
+/// An axis that has gone this share of its configured travel before it cannot follow was sent as fast as it can go.
+const SEARCHED_MIN: f64 = 0.1;
 
 /// Where an axis says that it is; `None` before it has said anything.
 pub(crate) fn place(core: &Core<'_>, axis: &str) -> Result<Option<Metres>, Failure> {
@@ -22,15 +22,27 @@ pub(crate) fn explained(
     start: Option<Metres>,
     failure: Failure,
 ) -> Failure {
-    let is_overdue = matches!(failure, Failure::Machine(machine::Failure::Overdue { .. }));
+    let is_endless = match &failure {
+        Failure::Machine(machine::Failure::Overdue { .. }) => true,
+        Failure::Machine(machine::Failure::Alarm { alarm, .. }) => alarm.is_endless_search(),
+        _ => false,
+    };
     let here = place(core, axis).ok().flatten();
-    let (true, Some(start), Some(here)) = (is_overdue, start, here) else {
+    let (Some(start), Some(here)) = (start, here) else {
         return failure;
     };
     let motion = &core.config.axis[axis].motion;
     let travel = Metres::from_mm(motion.soft_max_mm - motion.soft_min_mm);
     let moved = (here - start).abs();
-    if moved <= travel * TRAVELS_MAX {
+    if cannot_follow(&failure) && moved > travel * SEARCHED_MIN {
+        return Failure::BeforeZero {
+            axis: axis.to_owned(),
+            resolution_nm: motion.resolution_nm,
+            searched: Some(moved),
+            source: Box::new(failure),
+        };
+    }
+    if !is_endless || moved <= travel * TRAVEL_MARGIN {
         return failure;
     }
     Failure::NoLimitSwitch {
@@ -45,14 +57,21 @@ pub(crate) fn explained(
 /// `failure` of an axis that had not found its zero, by which alone it is known how far a count is: told by that,
 /// where its drive could not follow.
 pub(crate) fn before_zero(core: &Core<'_>, axis: &str, failure: Failure) -> Failure {
-    match &failure {
-        Failure::Machine(machine::Failure::Alarm { alarm, .. }) if alarm.is_following_error() => {
-            Failure::BeforeZero {
-                axis: axis.to_owned(),
-                resolution_nm: core.config.axis[axis].motion.resolution_nm,
-                source: Box::new(failure),
-            }
-        }
-        _ => failure,
+    if !cannot_follow(&failure) {
+        return failure;
+    }
+    Failure::BeforeZero {
+        axis: axis.to_owned(),
+        resolution_nm: core.config.axis[axis].motion.resolution_nm,
+        searched: None,
+        source: Box::new(failure),
+    }
+}
+
+/// Whether a drive says that its axis does not follow.
+fn cannot_follow(failure: &Failure) -> bool {
+    match failure {
+        Failure::Machine(machine::Failure::Alarm { alarm, .. }) => alarm.is_following_error(),
+        _ => false,
     }
 }

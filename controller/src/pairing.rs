@@ -21,10 +21,15 @@ impl Pairing {
     /// Of samples that come so often.
     pub(crate) fn of(sampling: Duration) -> Self {
         Self {
-            window: sampling.mul_f64(WINDOW),
+            window: Self::window_of(sampling),
             used_position: Time::ZERO,
             used_voltages: Time::ZERO,
         }
+    }
+
+    /// How far a position and voltages of such samples may lie apart.
+    pub(crate) fn window_of(sampling: Duration) -> Duration {
+        sampling.mul_f64(WINDOW)
     }
 
     /// Whether a position and voltages that came then belong together and are new; they are used then.

@@ -8,6 +8,7 @@ use drivers::device::{
     PoseInstrument, RotaryAxis, ServoDrive,
 };
 use units::{Approach, Radians, Time};
+use wire::cia402::PowerState;
 use wire::{Payload, Port, Ports};
 
 use crate::failure::Failure;
@@ -179,6 +180,16 @@ impl Devices {
             None => &*self.axes[at].device,
             Some(at) => &*self.rotaries[at].device,
         }
+    }
+
+    /// Whether drive number `at` has been enabled since the start, or says that it is.
+    pub(crate) fn may_move(&self, at: usize) -> bool {
+        let drive = self.drive(at);
+        let is_on = matches!(
+            drive.power_state(),
+            Some(PowerState::OperationEnabled | PowerState::QuickStopActive)
+        );
+        drive.was_enabled() || is_on
     }
 
     /// The same, to be told something.

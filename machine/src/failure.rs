@@ -10,6 +10,7 @@ use wire::LinkState;
 use wire::can::CanId;
 
 use crate::bus_text::{identifier_text, link_text};
+use crate::diagnosis::Finding;
 use crate::engine::EngineFailure;
 
 /// What shells add to the number of the signal that ended a program.
@@ -87,6 +88,16 @@ pub enum Failure {
         percent: f64,
         /// What did not come or go.
         missing: Box<Self>,
+    },
+    /// The traffic of the bus shows why something did not come, or came false.
+    #[error("{device}: {finding} ({})", without_device(failure, device))]
+    Explained {
+        /// The device's name in the configuration.
+        device: String,
+        /// What was seen.
+        finding: Finding,
+        /// What went wrong.
+        failure: Box<Self>,
     },
     /// Something went wrong shortly after the program was kept from its buses.
     #[error(
@@ -197,12 +208,21 @@ pub enum Failure {
     },
 }
 
+/// The text of `failure` where its device was named before.
+fn without_device(failure: &Failure, device: &str) -> String {
+    let text = failure.to_string();
+    let rest = text.strip_prefix(device);
+    let rest = rest.and_then(|rest| rest.strip_prefix(": "));
+    rest.map_or(text.clone(), str::to_owned)
+}
+
 impl Failure {
     /// The device that it is about, where it is about a single one.
     pub fn device(&self) -> Option<&str> {
         match self {
             Self::HeldUp { failure, .. } => failure.device(),
-            Self::Send { device, .. }
+            Self::Explained { device, .. }
+            | Self::Send { device, .. }
             | Self::Alarm { device, .. }
             | Self::Device { device, .. }
             | Self::Overdue { device, .. }
@@ -235,7 +255,7 @@ impl Failure {
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Engine(failure) => failure.exit_code(),
-            Self::HeldUp { failure, .. } => failure.exit_code(),
+            Self::HeldUp { failure, .. } | Self::Explained { failure, .. } => failure.exit_code(),
             Self::Interrupted => STOPPED_BY + SIGINT,
             Self::Terminated { signal } => STOPPED_BY.saturating_add(*signal),
             Self::NoSuchAxis { .. } | Self::NoSuchDevice { .. } => 2,

@@ -11,7 +11,9 @@
 mod bus_account;
 mod bus_text;
 mod bus_watch;
+mod cause_search;
 mod devices;
+mod diagnosis;
 mod driving;
 pub mod engine;
 mod failure;
@@ -30,6 +32,7 @@ mod parts;
 mod patience;
 mod ports;
 pub mod records;
+mod release;
 mod scan;
 mod sensing;
 mod spots;
@@ -46,7 +49,9 @@ mod zero_notes;
 
 pub use bus_account::BusCounts;
 pub use bus_text::{identifier_text, link_text};
+pub use cause_search::diagnose;
 pub use devices::Devices;
+pub use diagnosis::Finding;
 pub use driving::Driving;
 pub use engine::{Desk, Engine, EngineFailure};
 pub use failure::{Failure, Layered};

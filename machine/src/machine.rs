@@ -16,6 +16,7 @@ use wire::cia402::PowerState;
 use crate::bus_account::BusAccount;
 use crate::bus_watch::BusWatch;
 use crate::devices::Devices;
+use crate::diagnosis::Diagnosis;
 use crate::failure::Failure;
 use crate::host_watch::HostWatch;
 use crate::lookout::Lookout;
@@ -92,6 +93,7 @@ pub struct Machine {
     pub(crate) heartbeats: Vec<(Port, HeartbeatProducer)>,
     pub(crate) supervision: Supervision,
     pub(crate) bus_watch: BusWatch,
+    pub(crate) diagnosis: Diagnosis,
     pub(crate) bus_account: BusAccount,
     pub(crate) host_watch: HostWatch,
     /// The instruments and cameras that were started, by name.
@@ -122,6 +124,7 @@ impl Machine {
         Self {
             heartbeats: parts.buses.iter().map(heartbeat).collect(),
             bus_watch: BusWatch::new(&parts.buses),
+            diagnosis: Diagnosis::new(&parts.buses),
             bus_account: BusAccount::new(&parts.buses),
             host_watch: HostWatch::default(),
             approach: vec![ApproachTracker::new(); axes.len()],

@@ -4,7 +4,6 @@ use core::time::Duration;
 
 use units::Time;
 
-use crate::failure::Failure;
 use crate::observer::{Observer, Silent};
 
 /// So many warnings are kept for later: as many as anybody reads.
@@ -62,14 +61,17 @@ impl Notices {
         }
     }
 
-    /// The operator must not read "stopped" of an axis that did not say so.
-    pub(crate) fn tell_unconfirmed(&mut self, axis: &str, outcome: Result<(), Failure>) {
-        let Err(failure) = outcome else {
-            return;
+    /// The operator must not read "stopped" of an axis that did not say so. `why`: what is known of that.
+    pub(crate) fn warn_unconfirmed(&mut self, axis: &str, why: &str, stops_itself: bool) {
+        let itself = match stops_itself {
+            true => "its drive watches our heartbeat, and stops by itself once it does not hear it",
+            false => {
+                "nothing is known by which its drive would stop by itself: switch off its power"
+            }
         };
         self.observer.warning(&format!(
-            "axis {axis} did not confirm that it stopped ({failure}); its drive monitors our \
-             heartbeat and stops by itself: make sure that it stands still before you reach in"
+            "axis {axis} did not confirm that it stopped: {why}; {itself}; make sure that it stands still before you \
+             reach in"
         ));
     }
 }

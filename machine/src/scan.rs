@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use drivers::device::Identity;
 use drivers::device::canopen_node::ExpectedIdentity;
+use drivers::transport::SendError;
 use wire::can::CanFrame;
 use wire::canopen::sdo::{SdoRequest, SdoResponse};
 use wire::canopen::{Function, NodeId, Object};
@@ -82,6 +83,21 @@ struct Scan<'m> {
 }
 
 impl Scan<'_> {
+    /// Why a question to `node` could not be sent: a bus that is gone is named.
+    fn not_sent(&mut self, node: NodeId, source: SendError) -> Failure {
+        let SendError::Unusable { port, state } = source else {
+            let device = format!("{node} while scanning");
+            return Failure::Send { device, source };
+        };
+        // What the port says of itself has arrived already.
+        self.machine.catch_up();
+        let port = self.machine.ports.name(port);
+        match self.machine.diagnosis.is_bus_off(&port) {
+            true => Failure::BusOff { port },
+            false => Failure::Link { port, state },
+        }
+    }
+
     fn everywhere(&mut self) -> Result<Vec<Found>, Failure> {
         let mut found = Vec::new();
         for bus in self.machine.ports.buses.clone() {
@@ -158,10 +174,7 @@ impl Scan<'_> {
                 self.machine
                     .transport
                     .send(port, &Payload::Frame(frame))
-                    .map_err(|source| Failure::Send {
-                        device: format!("{node} while scanning"),
-                        source,
-                    })?;
+                    .map_err(|source| self.not_sent(*node, source))?;
             }
             self.collect(port, BATCH_TIME, (batch, object), answers)?;
         }

@@ -15,6 +15,7 @@ impl Machine {
     /// # Errors
     /// When a device does not answer, is another one than configured, or refuses its set-up.
     pub fn start(&mut self) -> Result<(), Failure> {
+        self.diagnosis.begin();
         self.catch_up();
         self.devices.lookouts.fill(Lookout::default());
         self.zeroed.fill(false);

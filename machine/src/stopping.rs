@@ -1,13 +1,17 @@
 //! How a machine comes to rest: in order, or because something failed.
 
 use core::time::Duration;
+use std::collections::BTreeMap;
 
 use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
 
+use crate::cause_search::{CauseSearch, diagnose};
+use crate::diagnosis::is_wait;
 use crate::failure::{Failure, Layered};
 use crate::kept_zero;
 use crate::machine::{Machine, Supervision};
+use crate::release::release_watches;
 
 /// The longest a stop may take before the next drive is tried.
 pub const STOP_LIMIT: Duration = Duration::from_secs(2);
@@ -25,6 +29,7 @@ impl Machine {
         for at in 0..self.devices.drive_count() {
             result = result.and(self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT));
         }
+        release_watches(self);
         self.supervision = Supervision::Off;
         result.and(self.ports.set_sync(&mut *self.transport, false))
     }
@@ -75,13 +80,14 @@ impl Machine {
             // Why it failed must be asked before stopping it takes its time.
             let failure = self.explain(failure);
             self.make_safe();
-            failure
+            diagnose(self, failure)
         })
     }
 
     /// The failure that has just happened, or its cause: a sender that fills a bus, or this
     /// computer, which was held up. Where a procedure judged something else while the computer was
-    /// held up, the observer is told so.
+    /// held up, the observer is told so. [`Machine::make_safe`] looks for more of its cause, and
+    /// [`diagnose`] returns that.
     pub fn explain<F: Layered>(&mut self, failure: F) -> F {
         let now = self.now();
         if failure.depends_on_time()
@@ -89,7 +95,14 @@ impl Machine {
         {
             self.notices.warn(lost.to_string());
         }
+        self.diagnosis.forget();
         failure.map_machine(|failure| {
+            self.bus_watch.ask();
+            self.diagnosis.ask(now, &failure);
+            if is_wait(&failure) {
+                // What it says before it is stopped tells more.
+                CauseSearch { machine: self }.probe();
+            }
             let failure = self.bus_watch.explain(now, failure);
             self.host_watch.explain(now, failure)
         })
@@ -103,22 +116,44 @@ impl Machine {
         // Nothing that waited may be sent after the stop.
         self.outbox.clear();
         let now = self.now();
-        for at in 0..self.devices.drive_count() {
+        let drives = 0..self.devices.drive_count();
+        // One that was off all the time is told to stop, and not waited for.
+        let may_move: Vec<usize> = drives
+            .clone()
+            .filter(|at| self.devices.may_move(*at))
+            .collect();
+        for at in drives {
             self.devices
                 .drive_mut(at)
                 .control(now, DriveCommand::QuickStop);
         }
-        for at in 0..self.devices.drive_count() {
+        let mut unconfirmed = BTreeMap::new();
+        for at in &may_move {
             // A drive that is gone cannot confirm; the others must still be stopped.
-            let stopped = self.await_outcome(at, "quick stop", STOP_LIMIT);
-            let axis = self.devices.name(at);
-            self.notices.tell_unconfirmed(&axis, stopped);
+            if let Err(failure) = self.await_outcome(*at, "quick stop", STOP_LIMIT) {
+                unconfirmed.insert(*at, failure);
+            }
         }
-        for at in 0..self.devices.drive_count() {
-            let disabled = self.control(at, DriveCommand::Disable, "disable", STOP_LIMIT);
-            let axis = self.devices.name(at);
-            self.notices.tell_unconfirmed(&axis, disabled);
+        if !unconfirmed.is_empty() {
+            CauseSearch { machine: self }.probe();
         }
+        let now = self.now();
+        for at in &may_move {
+            self.devices
+                .drive_mut(*at)
+                .control(now, DriveCommand::Disable);
+        }
+        for at in &may_move {
+            if let Err(failure) = self.await_outcome(*at, "disable", STOP_LIMIT) {
+                unconfirmed.entry(*at).or_insert(failure);
+            }
+        }
+        let mut search = CauseSearch { machine: self };
+        search.look();
+        for (at, failure) in unconfirmed {
+            search.warn_unconfirmed(at, &failure);
+        }
+        release_watches(self);
         self.approach.iter_mut().for_each(ApproachTracker::forget);
         let _ = self.ports.set_sync(&mut *self.transport, false);
         self.supervision = Supervision::Off;

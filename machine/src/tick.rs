@@ -91,10 +91,12 @@ impl Machine {
                 device.handle(arrival.at, &arrival.input);
             }
         });
+        let now = self.transport.now();
+        self.diagnosis.note(arrival, now);
         if self.supervision == Supervision::Stopping {
+            self.bus_watch.count(arrival, now);
             return Ok(());
         }
-        let now = self.transport.now();
         if let Some(told) = self.bus_watch.observe(arrival, now)? {
             self.notices.warn(told);
         }

@@ -347,7 +347,12 @@ fn code_of_machine(failure: &machine::Failure) -> Code {
             ..
         } => Code::Overdue,
         Of::Interrupted | Of::Terminated { .. } => Code::Stopped,
+        Of::Explained {
+            finding: machine::Finding::Restarted { .. },
+            ..
+        } => Code::Restarted,
         Of::HeldUp { failure, .. }
+        | Of::Explained { failure, .. }
         | Of::Babbling {
             missing: failure, ..
         } => code_of_machine(failure),

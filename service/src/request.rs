@@ -50,8 +50,9 @@ pub struct MoveRequest {
     /// of a platform (x, y, theta) and of three axes that are corrected together move as one.
     #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
-    /// How fast each may be at most; the usual speed of its configuration when left out. An angular speed where they
-    /// turn. Not for axes that move as one.
+    /// How fast each may be at most; no faster than its configuration says, which holds when left out. An angular speed
+    /// where they turn. Of axes that move as one: how fast the tool goes or the platform is shifted; an angular speed says
+    /// how fast the platform turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<TravelSpeedIn>)]
     pub speed: Option<Speed>,

@@ -258,6 +258,8 @@ impl Kept {
         let failure = self.machine.explain(failure);
         self.keeper.borrow_mut().begin_fault(&failure);
         self.machine.make_safe();
+        let failure = machine::diagnose(&mut self.machine, failure);
+        self.keeper.borrow_mut().explain_fault(&failure);
         self.keeper.borrow_mut().end_fault(&self.machine);
     }
 

@@ -2,6 +2,7 @@
 //! 10, 12 to 15, 22 to 24, 32, 50; those of the host are in `cyclic_host.rs`).
 
 use drivers::device::Alarm;
+use machine::Finding;
 use machine::engine::EngineFailure;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
@@ -101,15 +102,15 @@ fn a_second_node_with_the_drives_number_stops_it() {
 }
 
 #[test]
-fn a_drive_that_shows_one_position_for_ever_is_away_from_its_set_points() {
+fn process_data_that_freeze_stop_the_drive() {
     let fault = Fault::StaleData { node: DRIVE.into() };
-    let cause = |it: &Failure| {
+    let cause = |failure: &Failure| {
         matches!(
-            it,
-            Failure::Machine(
-                machine::Failure::Engine(EngineFailure::Deviates { .. })
-                    | machine::Failure::Alarm { .. }
-            )
+            failure,
+            Failure::Machine(machine::Failure::Explained {
+                finding: Finding::Frozen { .. },
+                ..
+            })
         )
     };
     // 1 mm and the last four set-points at 80 mm/s and more.
@@ -118,12 +119,15 @@ fn a_drive_that_shows_one_position_for_ever_is_away_from_its_set_points() {
 
 #[test]
 fn a_limit_switch_that_is_pressed_on_the_way_stops_the_drive() {
-    let cause = |it: &Failure| {
+    let cause = |failure: &Failure| {
         matches!(
-            it,
+            failure,
             Failure::Machine(
                 machine::Failure::Engine(EngineFailure::Deviates { .. })
-                    | machine::Failure::Alarm { .. }
+                    | machine::Failure::Explained {
+                        finding: Finding::OnLimitSwitch { .. },
+                        ..
+                    }
             )
         )
     };
@@ -141,13 +145,12 @@ fn samples_that_stay_away_stop_the_drive_within_four_periods() {
     let missing = |failure: &Failure| {
         matches!(
             failure,
-            Failure::Machine(
-                machine::Failure::Engine(EngineFailure::Missing { .. })
-                    | machine::Failure::Alarm {
-                        alarm: Alarm::PdoLost { .. },
-                        ..
-                    }
-            )
+            Failure::Machine(machine::Failure::Explained {
+                finding: Finding::NoProcessData { .. }
+                    | Finding::Silent { .. }
+                    | Finding::NoSample { .. },
+                ..
+            })
         )
     };
     for fault in [
@@ -166,8 +169,8 @@ fn a_heartbeat_that_stops_while_samples_go_on_stops_the_drive() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Machine(machine::Failure::Alarm {
-                    alarm: Alarm::HeartbeatLost { .. },
+                Failure::Machine(machine::Failure::Explained {
+                    finding: Finding::NoHeartbeat { .. },
                     ..
                 })
             )
@@ -348,16 +351,16 @@ fn a_drive_that_loses_its_power_is_not_homed_any_more() {
         fault
     });
     let wanted = Wanted {
-        cause: |it| {
+        cause: |failure| {
             matches!(
-                it,
-                Failure::Machine(
-                    machine::Failure::Engine(EngineFailure::Missing { .. })
-                        | machine::Failure::Alarm { .. }
-                )
+                failure,
+                Failure::Machine(machine::Failure::Explained {
+                    finding: Finding::Restarted { .. },
+                    ..
+                })
             )
         },
-        words: &["x:"],
+        words: &["x: node 1 restarted at"],
         within: PERIOD * 4,
         rest: BY_ITSELF,
     };

@@ -310,9 +310,9 @@ fn a_channel_that_is_stuck_is_noticed_and_named() {
     };
     assert_eq!(lack.source, Source::Slide(Axis::X), "{lack}");
     assert!(lack.to_string().contains("its input 2 is stuck"), "{lack}");
-    // 100 samples, each tenth SYNC; 200 ms of patience and some periods.
+    // 100 samples, each tenth SYNC, of which the first comes within ten; 200 ms of patience and some periods.
     let stopped = day.lives.len();
-    let soon = FAULT_AT + 1090..=FAULT_AT + 1170;
+    let soon = FAULT_AT + 1080..=FAULT_AT + 1170;
     assert!(soon.contains(&stopped), "{}", stopped - FAULT_AT);
     let day = play("hold", stuck(), 4 * SECOND);
     let u = day.u_um(FAULT_AT + day.lasting - 1);

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use drivers::device::Alarm;
+use machine::Finding;
 use mock_bus::fault::{Fault, FaultConfig};
 use truestage::Failure;
 use wire::canopen::emcy::EmergencyCode;
@@ -32,13 +33,27 @@ macro_rules! alarm {
     };
 }
 
+macro_rules! finding {
+    ($pattern:pat) => {
+        |failure: &Failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::Explained {
+                    finding: $pattern,
+                    ..
+                })
+            )
+        }
+    };
+}
+
 #[test]
 fn a_heartbeat_that_stops_while_process_data_go_on_stops_the_machine() {
     let fault = Fault::StopHeartbeat { node: DRIVE.into() };
     let scene = Scene::during(Phase::Move).after_ms(100).fault(fault);
     let wanted = Wanted {
-        cause: alarm!(Alarm::HeartbeatLost { .. }),
-        words: &["x:", "no heartbeat"],
+        cause: finding!(Finding::NoHeartbeat { .. }),
+        words: &["x: node 1 sends process data, but no heartbeat since"],
         within: HEARTBEAT,
         rest: HEARTBEAT + STOPPING,
     };
@@ -50,8 +65,8 @@ fn process_data_that_stop_while_the_heartbeat_goes_on_stop_the_machine_within_fo
     let fault = Fault::StopPdos { node: DRIVE.into() };
     let scene = Scene::during(Phase::Move).after_ms(100).fault(fault);
     let wanted = Wanted {
-        cause: alarm!(Alarm::PdoLost { .. }),
-        words: &["x:", "process data missing"],
+        cause: finding!(Finding::NoProcessData { .. }),
+        words: &["x: node 1 lives", "switched off", "process data missing"],
         within: PERIOD * 4,
         rest: PERIOD * 4 + STOPPING,
     };
@@ -63,8 +78,11 @@ fn a_drive_that_falls_silent_altogether_stops_the_machine_within_four_periods() 
     let fault = Fault::Mute { node: DRIVE.into() };
     let scene = Scene::during(Phase::Move).after_ms(100).fault(fault);
     let wanted = Wanted {
-        cause: alarm!(Alarm::PdoLost { .. }),
-        words: &["x:", "process data missing"],
+        cause: finding!(Finding::Silent { .. }),
+        words: &[
+            "x: no data from node 1 since",
+            "while node 2 answers: power or cable",
+        ],
         within: PERIOD * 4,
         rest: PERIOD * 4 + STOPPING,
     };
@@ -83,7 +101,7 @@ fn three_process_data_lost_in_a_row_stop_the_machine() {
     let fault = FaultConfig::times(drops(0x181), 3);
     let scene = Scene::during(Phase::Move).after_ms(100).inject(fault);
     let wanted = Wanted {
-        cause: alarm!(Alarm::PdoLost { .. }),
+        cause: finding!(Finding::Interrupted { .. }),
         words: &["missing for 3 SYNC"],
         within: PERIOD * 4,
         rest: PERIOD * 4 + STOPPING,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use machine::Finding;
 use mock_bus::fault::Fault;
 use truestage::Failure;
 
@@ -76,8 +77,16 @@ fn an_analog_module_that_falls_silent_ends_the_search() {
         node: "hall_adc".into(),
     };
     let wanted = Wanted {
-        cause: |failure| matches!(failure, Failure::Machine(machine::Failure::Alarm { .. })),
-        words: &["hall:", "no sample"],
+        cause: |failure| {
+            matches!(
+                failure,
+                Failure::Machine(machine::Failure::Explained {
+                    finding: Finding::NoProcessData { .. },
+                    ..
+                })
+            )
+        },
+        words: &["hall: node 2 lives", "no sample"],
         within: Duration::from_millis(40),
         rest: Duration::from_millis(140),
     };

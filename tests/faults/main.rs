@@ -5,6 +5,7 @@
 //! those of the fault classes.
 
 mod bus;
+mod causes;
 mod cyclic;
 mod cyclic_again;
 mod cyclic_host;
@@ -21,5 +22,6 @@ mod serial;
 mod start;
 mod stopping;
 mod storm;
+mod table;
 mod thermometers;
 mod witness;

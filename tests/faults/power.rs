@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use drivers::device::{Alarm, DeviceError};
+use machine::Finding;
 use mock_bus::fault::Fault;
 use mock_bus::node::cia402_drive::DriveQuirks;
 use truestage::Failure;
@@ -242,13 +243,13 @@ fn a_limit_switch_that_is_hit_ends_the_move() {
         cause: |failure| {
             matches!(
                 failure,
-                Failure::Machine(machine::Failure::Alarm {
-                    alarm: Alarm::Emergency { .. },
+                Failure::Machine(machine::Failure::Explained {
+                    finding: Finding::OnLimitSwitch { .. },
                     ..
                 })
             )
         },
-        words: &["x:"],
+        words: &["x: the positive limit switch of node 1 is pressed"],
         within: PERIOD * 3,
         rest: PERIOD * 3 + STOPPING,
     };

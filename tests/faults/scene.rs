@@ -33,9 +33,14 @@ pub const WATCH_MASTER: Duration = Duration::from_millis(500);
 /// What a stop may take once it is ordered: 200 mm/s at 20 m/s², a few frames.
 pub const STOPPING: Duration = Duration::from_millis(100);
 
+/// How long the witness looks on after the controller has ended.
+pub const WATCHED: Duration = Duration::from_secs(2);
+
 /// What the machine is doing when the fault comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
+    /// Asking who is there.
+    Scan,
     /// Starting the devices.
     Start,
     /// Finding its zero.
@@ -256,9 +261,36 @@ impl Scene {
         self
     }
 
-    /// Plays the scene.
+    /// Plays the scene, and looks on for a while after its end.
     #[track_caller]
-    pub fn play(mut self) -> Played {
+    pub fn play(self) -> Played {
+        let span = self.held_up;
+        let (played, delivered) = self.play_to_end();
+        if let Some(span) = span {
+            let unseen = played.seen().unseen_since(played.due);
+            assert!(
+                unseen >= span,
+                "held up for {unseen:?} in place of {span:?}"
+            );
+        }
+        played.seen().everything_was_done();
+        played.rest();
+        if let Some(delivered) = &delivered {
+            assert!(
+                delivered(&played.bench.emulated),
+                "the fault was never delivered"
+            );
+        }
+        played
+    }
+
+    /// Plays the scene to the end of its phase.
+    #[track_caller]
+    pub fn play_on(self) -> Played {
+        self.play_to_end().0
+    }
+
+    fn play_to_end(mut self) -> (Played, Option<Question>) {
         let seen = Rc::new(RefCell::new(Testimony::default()));
         let witness = Rc::clone(&seen);
         let mut bench = Bench::wrapped(self.seed, &self.machine, &self.emulated, |inner| {
@@ -305,22 +337,7 @@ impl Scene {
             calibrated,
             cause: cause.get(),
         };
-        if let Some(span) = self.held_up {
-            let unseen = played.seen().unseen_since(due);
-            assert!(
-                unseen >= span,
-                "held up for {unseen:?} in place of {span:?}"
-            );
-        }
-        played.seen().everything_was_done();
-        played.rest();
-        if let Some(delivered) = &self.delivered {
-            assert!(
-                delivered(&played.bench.emulated),
-                "the fault was never delivered"
-            );
-        }
-        played
+        (played, self.delivered)
     }
 
     fn schedule(&mut self, bench: &Bench, due: Time, seen: &RefCell<Testimony>) -> Vec<FaultId> {
@@ -354,7 +371,7 @@ impl Scene {
 }
 
 fn prepare(machine: &mut Machine, phase: Phase, store: &Store) -> Result<(), Failure> {
-    if matches!(phase, Phase::Start) {
+    if matches!(phase, Phase::Scan | Phase::Start) {
         return Ok(());
     }
     machine.start()?;
@@ -373,6 +390,7 @@ fn perform(
     cause: &Cell<Option<Cause>>,
 ) -> Result<(), Failure> {
     match phase {
+        Phase::Scan => drop(machine.scan()?),
         Phase::Start => machine.start()?,
         Phase::Zero => {
             machine.linear("x")?.zero(store)?;
@@ -442,7 +460,7 @@ impl Played {
     /// Two seconds without a controller, with the witness looking on.
     fn rest(&self) {
         let mut simulation = self.bench.emulated.simulation_mut();
-        let end = simulation.now() + Duration::from_secs(2);
+        let end = simulation.now() + WATCHED;
         while simulation.now() < end {
             let next = simulation.now() + Duration::from_millis(2);
             simulation.advance(next);

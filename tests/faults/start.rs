@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use drivers::device::DeviceError;
+use machine::Finding;
 use mock_bus::node::canopen_server::Manners;
 use truestage::Failure;
 
@@ -24,6 +25,13 @@ macro_rules! device {
             )
         }
     };
+}
+
+fn is_found(failure: &Failure, is_wanted: fn(&Finding) -> bool) -> bool {
+    match failure {
+        Failure::Machine(machine::Failure::Explained { finding, .. }) => is_wanted(finding),
+        _ => false,
+    }
 }
 
 #[track_caller]
@@ -195,8 +203,12 @@ fn a_drive_that_answers_no_question_is_refused_after_a_bounded_time() {
         ..Manners::default()
     };
     let wanted = Wanted {
-        cause: device!(DeviceError::Timeout { .. } | DeviceError::SdoTimeout { .. }),
-        words: &["x:", "node 1"],
+        cause: |failure| {
+            is_found(failure, |finding| {
+                matches!(finding, Finding::NoAnswer { .. })
+            })
+        },
+        words: &["x: node 1 answers nothing since", "boot-up or an answer"],
         within: Duration::from_secs(15),
         rest: Duration::ZERO,
     };
@@ -223,8 +235,8 @@ fn a_drive_that_stops_answering_in_the_middle_of_its_setup_is_named_with_the_obj
 fn a_drive_that_is_not_there_is_named() {
     let scene = start().machine("node_id = 1\n", "node_id = 5\n");
     let wanted = Wanted {
-        cause: device!(DeviceError::Timeout { .. }),
-        words: &["x:", "node 5", "boot-up or an answer"],
+        cause: |failure| is_found(failure, |finding| matches!(finding, Finding::Silent { .. })),
+        words: &["x: node 5 was never heard", "boot-up or an answer"],
         within: Duration::from_secs(15),
         rest: Duration::ZERO,
     };

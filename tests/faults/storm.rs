@@ -44,6 +44,7 @@ fn drive_or_bus(failure: &Failure) -> bool {
             machine::Failure::Alarm { .. }
                 | machine::Failure::Device { .. }
                 | machine::Failure::Overdue { .. }
+                | machine::Failure::Explained { .. }
                 | machine::Failure::Babbling { .. }
                 | machine::Failure::Send { .. }
         )

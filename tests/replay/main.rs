@@ -204,7 +204,10 @@ fn a_recording_whose_drive_falls_silent_ends_with_the_reason() {
     let result = machine.guarded(|machine| procedure(machine, &store).map(drop));
     let failure = result.unwrap_err();
     assert!(
-        matches!(failure, Failure::Machine(machine::Failure::Alarm { .. })),
+        matches!(
+            failure,
+            Failure::Machine(machine::Failure::Explained { .. })
+        ),
         "{failure}"
     );
     assert_eq!(failure.exit_code(), 4);

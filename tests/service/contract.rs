@@ -1,5 +1,6 @@
 //! The contract of a motion, line by line, on every interface.
 
+mod after_stops;
 mod aside;
 mod by_hand;
 mod calibrations;
@@ -15,6 +16,7 @@ mod paused;
 pub(crate) mod questions;
 mod repeated;
 mod runs;
+mod speeds;
 mod together;
 mod turns;
 

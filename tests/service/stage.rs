@@ -10,7 +10,7 @@ use drivers::transport::{SendError, Transport};
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::simulation::Simulation;
 use service::{Desk, Opened, Service};
-use tests::{Rig, Shipped, shipped_config};
+use tests::{PlantTrace, Rig, Shipped, shipped_config};
 use truestage::config::Loaded;
 use truestage::emulated::{Emulated, EmulatedOnPtys};
 use truestage::{Failure, Machine, ports};
@@ -197,6 +197,7 @@ struct Gated {
     gate: Arc<Gate>,
     /// In this process it is this thread that meddles.
     meddling: Option<(Emulated, Receiver<Meddling>)>,
+    trace: Arc<Mutex<Option<PlantTrace>>>,
 }
 
 impl Transport for Gated {
@@ -215,6 +216,11 @@ impl Transport for Gated {
     fn receive_unhurried(&mut self, until: Time, unhurried: Ports) -> Option<Arrival> {
         self.gate.hold(self.inner.now());
         if let Some((emulated, meddling)) = &self.meddling {
+            let mut trace = self.trace.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(trace) = trace.as_mut() {
+                trace.note(self.inner.now(), &emulated.simulation());
+            }
+            drop(trace);
             for meddle in meddling.try_iter() {
                 meddle(&mut emulated.simulation_mut());
             }
@@ -245,6 +251,7 @@ pub(crate) struct Stage {
     pub(crate) gate: Arc<Gate>,
     place: Place,
     service: Option<Service>,
+    trace: Arc<Mutex<Option<PlantTrace>>>,
 }
 
 impl Stage {
@@ -297,6 +304,8 @@ impl Stage {
         O: FnOnce(&Loaded) -> Result<OpenedTransport, Failure> + Send + 'static,
     {
         let gate = Arc::new(Gate::default());
+        let trace = Arc::default();
+        let inner_trace = Arc::clone(&trace);
         let inner_gate = Arc::clone(&gate);
         let store = loaded.config.machine.store();
         let passing = gate.wait_for_an_end();
@@ -306,6 +315,7 @@ impl Stage {
                 inner,
                 gate: inner_gate,
                 meddling,
+                trace: inner_trace,
             };
             Ok(Opened {
                 machine: Machine::new(&loaded, Box::new(transport)),
@@ -323,6 +333,7 @@ impl Stage {
             gate,
             place,
             service: Some(service),
+            trace,
         }
     }
 
@@ -346,6 +357,20 @@ impl Stage {
         meddling.send(meddle).expect("the machine is there");
         let _passing = self.gate.pass();
         received.recv().expect("the machine ticks")
+    }
+
+    /// Takes down what the plant does from now on; where it is in this process.
+    pub(crate) fn trace_anew(&self) {
+        *self.trace() = Some(PlantTrace::default());
+    }
+
+    /// What the plant has done since.
+    pub(crate) fn traced(&self) -> PlantTrace {
+        self.trace().clone().expect("it was asked for")
+    }
+
+    fn trace(&self) -> MutexGuard<'_, Option<PlantTrace>> {
+        self.trace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Something goes wrong from now on.

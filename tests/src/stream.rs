@@ -292,6 +292,7 @@ pub const fn is_lateness(failure: &Failure) -> bool {
                 | machine::Failure::Device { .. }
                 | machine::Failure::Overdue { .. }
                 | machine::Failure::HeldUp { .. }
+                | machine::Failure::Explained { .. }
         )
     )
 }

@@ -3,8 +3,8 @@
 use core::fmt;
 
 use crate::{
-    Metres, MetresPerSecond, MetresPerSecondSquared, Quantity, Radians, RadiansPerSecond,
-    RadiansPerSecondSquared,
+    AxisSpeed, Metres, MetresPerSecond, MetresPerSecondSquared, Quantity, Radians,
+    RadiansPerSecond, RadiansPerSecondSquared,
 };
 
 mod sealed {
@@ -29,7 +29,7 @@ mod sealed {
 /// ```
 pub trait Coordinate: Quantity + Into<LengthOrAngle> + sealed::Sealed {
     /// Its change in time.
-    type Speed: Quantity;
+    type Speed: Quantity + Into<AxisSpeed>;
     /// The change of its speed in time.
     type Acceleration: Quantity;
 

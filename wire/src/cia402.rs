@@ -279,6 +279,123 @@ impl HomingStatus {
     }
 }
 
+/// A statusword in words: its state, and each bit that says more, by its name in the mode that the drive is in.
+///
+/// # Example
+///
+/// ```
+/// use wire::cia402::{NamedStatus, OperationMode, Statusword};
+///
+/// let word = Statusword::from_bits_retain(0x1237);
+/// let mode = Some(OperationMode::Homing);
+/// let text = "statusword 0x1237: operation enabled; homing attained, not target reached";
+/// assert_eq!(NamedStatus { word, mode }.to_string(), text);
+/// let word = Statusword::from_bits_retain(0x0240);
+/// let text = "statusword 0x0240: switch on disabled; voltage off: mains, STO, enable input";
+/// assert_eq!(NamedStatus { word, mode: None }.to_string(), text);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NamedStatus {
+    /// The statusword.
+    pub word: Statusword,
+    /// The mode that gives bits 10, 12 and 13 their names, where it is known.
+    pub mode: Option<OperationMode>,
+}
+
+impl NamedStatus {
+    /// The bits of `word` in `mode`, where that is known.
+    pub const fn new(word: Statusword, mode: Option<OperationMode>) -> Self {
+        Self { word, mode }
+    }
+
+    /// The bits that belong to the mode.
+    fn mode_bits(self) -> Vec<&'static str> {
+        let has = |bit: Statusword| self.word.contains(bit);
+        let is_on = self.word.state() == PowerState::OperationEnabled;
+        match self.mode {
+            Some(OperationMode::Homing) => match HomingStatus::of(self.word) {
+                HomingStatus::InProgress if !is_on => vec![],
+                HomingStatus::InProgress => vec!["homing in progress"],
+                HomingStatus::NotStarted => vec!["homing interrupted or not started"],
+                HomingStatus::Attained => vec!["homing attained, not target reached"],
+                HomingStatus::Done => vec!["homing attained, target reached"],
+                HomingStatus::ErrorMoving => vec!["homing error, still moving"],
+                HomingStatus::ErrorStopped => vec!["homing error, stopped"],
+                HomingStatus::Unknown(_) => vec!["homing attained and homing error at once"],
+            },
+            Some(OperationMode::ProfilePosition) => {
+                let mut bits = vec![match has(Statusword::TARGET_REACHED) {
+                    true => "target reached",
+                    false => "not target reached",
+                }];
+                bits.extend(has(Statusword::MODE_12).then_some("set-point acknowledged"));
+                bits.extend(has(Statusword::MODE_13).then_some("following error"));
+                bits
+            }
+            Some(OperationMode::CyclicSynchronousPosition) => {
+                let mut bits = vec![match has(Statusword::MODE_12) {
+                    true => "follows its set-points",
+                    false => "does not follow its set-points",
+                }];
+                bits.extend(has(Statusword::MODE_13).then_some("following error"));
+                bits
+            }
+            _ => {
+                let named = [
+                    (Statusword::TARGET_REACHED, "target reached"),
+                    (
+                        Statusword::MODE_12,
+                        "bit 12: set-point acknowledged, or homing attained",
+                    ),
+                    (
+                        Statusword::MODE_13,
+                        "bit 13: following error, or homing error",
+                    ),
+                ];
+                let set = named.iter().filter(|(bit, _)| has(*bit));
+                set.map(|(_, name)| *name).collect()
+            }
+        }
+    }
+
+    /// The bits that mean the same in each mode, where they say something.
+    fn common_bits(self) -> Vec<&'static str> {
+        let has = |bit: Statusword| self.word.contains(bit);
+        let mut bits = Vec::new();
+        let needs_voltage = !matches!(
+            self.word.state(),
+            PowerState::NotReadyToSwitchOn | PowerState::Unknown(_)
+        );
+        if needs_voltage && !has(Statusword::VOLTAGE_ENABLED) {
+            bits.push("voltage off: mains, STO, enable input");
+        }
+        if has(Statusword::WARNING) {
+            bits.push("warning");
+        }
+        if has(Statusword::INTERNAL_LIMIT) {
+            bits.push("internal limit active: limit switch, soft limit, speed or torque");
+        }
+        if !has(Statusword::REMOTE) {
+            bits.push("not remote: it does not obey the bus");
+        }
+        bits
+    }
+}
+
+impl fmt::Display for NamedStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let raw = self.word.bits();
+        match self.word.state() {
+            PowerState::Unknown(_) => write!(f, "statusword {raw:#06X}: no known state")?,
+            state => write!(f, "statusword {raw:#06X}: {state}")?,
+        }
+        for bit in self.mode_bits().into_iter().chain(self.common_bits()) {
+            write!(f, "; {bit}")?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,6 +433,43 @@ mod tests {
         assert_eq!(Controlword::SWITCH_ON_COMMAND.bits(), 0x07);
         assert_eq!(Controlword::ENABLE_COMMAND.bits(), 0x0F);
         assert_eq!(Controlword::QUICK_STOP_COMMAND.bits(), 0x02);
+    }
+
+    #[track_caller]
+    fn check_named(raw: u16, mode: Option<OperationMode>, expected: &str) {
+        let word = Statusword::from_bits_retain(raw);
+        assert_eq!(NamedStatus { word, mode }.to_string(), expected);
+    }
+
+    #[test]
+    fn bits_are_named_by_the_mode_that_gives_them_their_meaning() {
+        check_named(
+            0x0637,
+            None,
+            "statusword 0x0637: operation enabled; target reached",
+        );
+        check_named(
+            0x0237,
+            Some(OperationMode::ProfilePosition),
+            "statusword 0x0237: operation enabled; not target reached",
+        );
+        check_named(
+            0x2237,
+            Some(OperationMode::CyclicSynchronousPosition),
+            "statusword 0x2237: operation enabled; does not follow its set-points; following error",
+        );
+        check_named(
+            0x2637,
+            Some(OperationMode::Homing),
+            "statusword 0x2637: operation enabled; homing error, stopped",
+        );
+        check_named(
+            0x0088,
+            None,
+            "statusword 0x0088: fault; voltage off: mains, STO, enable input; warning; not remote: it does not obey \
+             the bus",
+        );
+        check_named(0x0211, None, "statusword 0x0211: no known state");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use core::fmt;
 
 use units::{Metres, Volts};
 
+use super::jump::{self, Jump};
 use super::profile::{Bin, profile, slopes};
 use super::{Sensor, Settings};
 use crate::hall_zero::HallPoint;
@@ -46,6 +47,8 @@ pub enum SensorFault {
         /// The travel.
         travel: Metres,
     },
+    /// A voltage jumped while the axis was searching.
+    Jumped(Jump),
     /// The curves are each other's.
     Swapped,
     /// A curve is upside down.
@@ -76,6 +79,7 @@ impl fmt::Display for SensorFault {
                 voltage.value(),
                 travel.um()
             ),
+            Self::Jumped(jump) => jump.fmt(f),
             Self::Swapped => f.write_str("the two sensors look swapped"),
             Self::Inverted { sensor } => write!(f, "{sensor} looks inverted in polarity"),
         }
@@ -115,6 +119,7 @@ pub fn diagnose(points: &[HallPoint], nominal: Metres, settings: &Settings) -> O
     sensors
         .iter()
         .find_map(|&sensor| saturated(points, sensor, settings))
+        .or_else(|| jump::find(points, settings).map(SensorFault::Jumped))
         .or_else(|| {
             sensors
                 .iter()

@@ -33,6 +33,7 @@
 
 mod diagnose;
 mod failure;
+mod jump;
 mod passes;
 mod plan;
 mod profile;
@@ -46,6 +47,7 @@ mod survey;
 
 pub use diagnose::{SensorFault, diagnose};
 pub use failure::{Reason, SearchFailure, Step};
+pub use jump::{Jump, JumpCause};
 pub use passes::{Pass, refine_passes};
 pub use plan::{FlatLevel, PlanError, PlannedLevel, ZeroPlan, flat_level, plan_zero};
 pub use refine::{

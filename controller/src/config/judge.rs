@@ -88,6 +88,17 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// At least `least`, which is what the words `limit` say.
+    pub(crate) fn at_least(&mut self, key: &str, value: f64, (limit, least): (&str, f64)) {
+        // A NaN, which TOML can write, is no limit, either.
+        let is_enough = value >= least;
+        if !is_enough {
+            let cause = format!("{} is less than {limit}, {}", Short(value), Short(least));
+            let help = format!("give at least {}, or lower {limit}", Short(least));
+            self.say(key, cause, help);
+        }
+    }
+
     pub(crate) fn below(&mut self, low: (&str, f64), high: (&str, f64)) {
         // A NaN, which TOML can write, is not in order, either.
         let in_order = low.1 < high.1;

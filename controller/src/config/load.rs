@@ -722,7 +722,7 @@ mod tests {
             beyond.contains("platform.calibrate.first_mm: strokes and overrun"),
             "{beyond}"
         );
-        let fast = refused("speed_mm_per_s = 10.0", "speed_mm_per_s = 500.0");
+        let fast = refused("speed_mm_per_s = 10.0  ", "speed_mm_per_s = 500.0  ");
         assert!(
             fast.contains("500 is more than the least speed_max_mm_per_s"),
             "{fast}"

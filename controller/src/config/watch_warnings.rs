@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn a_move_that_hangs_for_hours_is_told() {
         let edit = ("move_timeout_s = 30.0", "move_timeout_s = 30000.0");
-        let says = "the whole travel of 506 mm takes 5.16s";
+        let says = "the whole travel of 506 mm takes 2.73s";
         check(VOLUMETRIC, &[edit], &["axis.x.move_timeout_s"], says);
     }
 

@@ -1,65 +1,70 @@
-//! Which key of the configuration would let a refused table pass, and whether that is wise.
+//! Advice for what was refused: what to look for. No advice widens a limit.
 
 use compensator::error_table::{CompensationError, StandOff};
 use units::portable::{log10, powi};
-use units::{Metres, Volts};
+use units::{Metres, Short, Volts};
 
-/// What to do about a position that stands off its neighbours.
-pub(super) fn of_stand_off(axis: &str, refused: &StandOff) -> String {
-    let turn = if refused.is_after_turn {
-        ". The stage turns just before this position: where it takes up its lost motion slowly, or arrives \
-         otherwise after a short way, a longer `overrun_mm` in the section of the run helps"
-    } else {
-        ""
-    };
-    format!(
-        "{turn}. Measure again, and finer around it: a knock, dirt on the scale, a loose reflector, a \
-         count lost in every run? `jump_limit_um = {}` in [axis.{axis}.compensation] would accept \
-         it, which is wise only when finer positions show the same place again: what is accepted is \
-         taken for the stage",
-        enough(refused.seen.abs())
-    )
+/// What to look for where a position stands off its neighbours.
+pub(super) fn of_stand_off(refused: &StandOff) -> &'static str {
+    if refused.is_after_turn {
+        return ". The stage turns just before this position: where it takes up its lost motion slowly, or arrives \
+                otherwise after a short way, a longer `overrun_mm` in the section of the run helps. Look for a knock, dirt \
+                on the scale, a loose reflector, a count lost in every run, then measure again, and finer around it";
+    }
+    ". Look for a knock, dirt on the scale, a loose reflector, a count lost in every run, then measure again, and finer \
+     around it"
 }
 
-/// What to do about a table beyond a limit of the configuration.
-pub(super) fn of_limit(axis: &str, refused: &CompensationError) -> String {
-    let (key, number) = match refused {
-        CompensationError::TooLarge { seen, .. } => ("size_limit_um", enough(seen.abs())),
-        CompensationError::TooSteep { seen, .. } if *seen < 0.5 => {
-            ("slope_limit", rounded_up(*seen))
+/// What to look for where a table is beyond a limit of the configuration.
+pub(super) const fn of_limit(refused: &CompensationError) -> &'static str {
+    match refused {
+        CompensationError::TooLarge { .. } => {
+            ". Look for a wrong unit or sign of the instrument, a loose reflector, another optical configuration, then \
+             measure again"
         }
-        CompensationError::TooSteep { .. }
-        | CompensationError::NotInvertible { .. }
-        | CompensationError::Limit { .. } => return String::new(),
-    };
-    format!(
-        "; `{key} = {number}` in [axis.{axis}.compensation] would accept it, which is wise only \
-         where an error like that is expected of this stage"
-    )
+        CompensationError::TooSteep { .. } => {
+            ". Look for a knock, a count lost on the way, a loose reflector, then measure again, and finer around it"
+        }
+        CompensationError::NotInvertible { .. } | CompensationError::Limit { .. } => "",
+    }
 }
 
-/// What to do about a scale beyond its limit, when none of the mistakes that are known by their factor made it.
-pub(super) fn of_scale(ppm: f64) -> String {
+/// What to look for where a scale is beyond its limit, when none of the mistakes that are known by their factor made it.
+pub(super) fn of_scale(ppm: f64) -> &'static str {
     /// An encoder is off by less: beyond it something is set up wrongly.
     const PLAUSIBLE_PPM: f64 = 10_000.0;
     if ppm.abs() > PLAUSIBLE_PPM {
-        return String::new();
+        return "";
     }
-    format!(
-        ". `scale_limit_ppm = {}` would let it pass, which is wise only where the encoder is known to be off by \
-         that much",
-        rounded_up(ppm.abs())
-    )
+    ". Look for a beam that is not along the axis (cosine), the temperature, pressure and material that are configured, and \
+     the resolution of the encoder"
 }
 
-/// What to do about a place that is not found again.
-pub(super) fn of_closure(seen: Metres) -> String {
+/// What to look for where a place is not found again.
+pub(super) fn of_closure(seen: Metres) -> &'static str {
     if !seen.value().is_finite() {
-        return "It is no number: the instrument said nothing usable".to_owned();
+        return "It is no number: the instrument said nothing usable";
+    }
+    "Look for a loose reflector or instrument, vibration, a stage that has not warmed up, then measure again"
+}
+
+/// What an axis says that could not follow before its zero, and what to look for; `searched`: so far it went for its limit
+/// switch.
+pub(super) fn of_start(axis: &str, resolution_nm: f64, searched: Option<Metres>) -> String {
+    if let Some(searched) = searched {
+        return format!(
+            "was blocked after {:.3} mm on the way to its limit switch, which it did not meet: the limit switch is dead \
+             or its wire broken and the axis is on its end stop, or something blocks it. Press the switch by hand and look \
+             at 0x60FD of its drive; then look for what blocks the axis",
+            searched.mm()
+        );
     }
     format!(
-        "`closure_limit_um = {}` would let it pass, which is wise only where the stage returns to no place better",
-        enough(seen.abs())
+        "could not follow before it had found its zero, and nothing has shown so far that `resolution_nm = {}` in \
+         [axis.{axis}] is right: where a count of the encoder is longer than that, the axis is sent as many times faster \
+         than it is asked to. Compare it with the encoder's data sheet; if it is right, look for what blocks or overloads \
+         the axis",
+        Short(resolution_nm)
     )
 }
 
@@ -89,15 +94,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_would_let_a_refusal_pass_is_told_unless_it_is_a_mistake_of_another_size() {
-        assert!(
-            of_scale(-1250.6).contains("`scale_limit_ppm = 1300`"),
-            "{}",
-            of_scale(-1250.6)
-        );
+    fn no_advice_proposes_a_wider_limit() {
+        for text in [of_scale(-1250.6), of_closure(Metres::from_um(-1.234))] {
+            assert!(text.contains("Look for"), "{text}");
+            assert!(!text.contains("limit"), "{text}");
+        }
         assert_eq!(of_scale(1e6), "");
-        let closure = of_closure(Metres::from_um(-1.234));
-        assert!(closure.contains("`closure_limit_um = 1.3`"), "{closure}");
         assert!(of_closure(Metres(f64::NAN)).contains("no number"));
     }
 

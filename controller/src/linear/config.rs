@@ -180,8 +180,8 @@ pub enum EndPolicyName {
 /// and what is left of the largest is compared with the rest (Student's t, both approaches
 /// together). The limit is set for one good table in 10 000, and is never below half of what the
 /// instrument counts (0.158 µm with a linear interferometer). `calibrate` prints which error of one
-/// position would have been noticed; a refusal names position, error, limit, and the
-/// `jump_limit_um` that would accept it. Give it only where finer positions have shown that the
+/// position would have been noticed; a refusal names position, error and limit.
+/// Give `jump_limit_um` only where finer positions have shown that the
 /// stage is like that: a wrong position within it is corrected like a right one. Tables of fewer
 /// than some ten positions say little about one of them; the limits of size and slope hold for them
 /// all the same.

@@ -29,6 +29,15 @@ impl LinearStage<'_> {
         sampling_of(self.core.config, self.config, config)
     }
 
+    /// How much older than the position the voltages may be: nothing where both are sampled at one SYNC.
+    pub(super) fn age_of_voltages(&self, config: &ZeroConfig) -> Duration {
+        let polled = self.core.config.analog[&config.analog].poll_period();
+        match polled.is_zero() {
+            true => Duration::ZERO,
+            false => Pairing::window_of(self.sampling(config)),
+        }
+    }
+
     pub(super) fn pairing(&self, config: &ZeroConfig) -> Pairing {
         Pairing::of(self.sampling(config))
     }

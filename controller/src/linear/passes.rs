@@ -67,7 +67,7 @@ impl LinearStage<'_> {
     }
 
     /// The usual speed, or so slow that the flanks get the samples that they need.
-    fn pass_speed(
+    pub(super) fn pass_speed(
         &self,
         config: &ZeroConfig,
         settings: &Settings,

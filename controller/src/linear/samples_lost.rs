@@ -93,6 +93,8 @@ const fn can_come_of_gaps(error: &RefineError) -> bool {
         | RefineError::Swapped { .. }
         | RefineError::Fit { .. } => true,
         RefineError::NotFinite { .. }
+        | RefineError::Jumped(_)
+        | RefineError::SlopeInverted
         | RefineError::TooFewPasses { .. }
         | RefineError::LackOfFit { .. }
         | RefineError::TooManyOutliers { .. }

@@ -254,12 +254,19 @@ impl LinearStage<'_> {
         })?;
         // The drive takes its zero in whole counts.
         let count = self.config.motion.resolution_nm.abs() * 1e-9;
-        let budget = zero_budget::budget(&estimate, count).map_err(|source| Failure::Budget {
-            axis: self.axis.to_owned(),
-            source,
-        })?;
+        let age = self.age_of_voltages(config).as_secs_f64();
+        let lag = Metres(self.pass_speed(config, settings, outcome).value() * age);
+        let budget =
+            zero_budget::budget(&estimate, count, lag).map_err(|source| Failure::Budget {
+                axis: self.axis.to_owned(),
+                source,
+            })?;
         let of_passes = estimate.standard_uncertainty.value();
-        estimate.standard_uncertainty = Metres(combine(&[of_passes, of_rounding(count)]));
+        estimate.standard_uncertainty = Metres(combine(&[
+            of_passes,
+            of_rounding(count),
+            zero_budget::of_lag(lag),
+        ]));
         let limit = Metres::from_um(config.standard_uncertainty_limit_um);
         if estimate.standard_uncertainty > limit {
             let seen = estimate.standard_uncertainty;

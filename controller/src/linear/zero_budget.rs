@@ -1,4 +1,5 @@
-//! What makes a zero uncertain: how its passes repeat, and that a drive takes its zero in whole counts.
+//! Contributions to the uncertainty of a zero: its passes, whole counts of its drive, and voltages that are older than
+//! their position.
 
 use compensator::budget::{BudgetError, Contribution, Correlation, Evaluation, PlacesBudget};
 use compensator::hall_zero::ZeroEstimate;
@@ -7,11 +8,16 @@ use units::Metres;
 
 use crate::store::budget::PlacesBudgetRecord;
 
-/// The budget of a drive's zero of counts of `count` metres where `estimate` says that the origin is.
+/// Returns the budget of a drive's zero of counts of `count` metres where `estimate` says that the origin is. Meanwhile
+/// the axis moved by `lag` at most from where the voltages were sampled to where the position was.
 ///
 /// The few degrees of freedom of the passes have widened their standard uncertainty already: that is in the
 /// sensitivity.
-pub fn budget(estimate: &ZeroEstimate, count: f64) -> Result<PlacesBudget<Metres>, BudgetError> {
+pub fn budget(
+    estimate: &ZeroEstimate,
+    count: f64,
+    lag: Metres,
+) -> Result<PlacesBudget<Metres>, BudgetError> {
     let of_passes = estimate.standard_uncertainty.value();
     let known = estimate.passes.filter(|it| it.scatter > Metres::ZERO);
     let (name, scatter, freedom) = match known {
@@ -26,11 +32,22 @@ pub fn budget(estimate: &ZeroEstimate, count: f64) -> Result<PlacesBudget<Metres
     } else {
         0.0
     };
-    let lines = vec![
+    let mut lines = vec![
         line(name, Evaluation::A, scatter, freedom),
         line("whole counts of the drive", Evaluation::B, count, None),
     ];
-    PlacesBudget::new(lines, vec![vec![by, of_rounding(1.0)]])
+    let mut sensitivities = vec![by, of_rounding(1.0)];
+    if lag > Metres::ZERO {
+        let name = "age of the voltages";
+        lines.push(line(name, Evaluation::B, lag.value(), None));
+        sensitivities.push(of_lag(Metres(1.0)));
+    }
+    PlacesBudget::new(lines, vec![sensitivities])
+}
+
+/// The standard uncertainty of a place that is off by `lag` at most, in metres (GUM, 4.3.7).
+pub(super) fn of_lag(lag: Metres) -> f64 {
+    lag.value() / 3.0_f64.sqrt()
 }
 
 /// As it is kept, of the zero at `origin`.

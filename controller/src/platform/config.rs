@@ -24,7 +24,8 @@ pub struct PlatformConfig {
     pub exposures: u32,
     /// How long all screws stand before a picture.
     pub settle_ms: u32,
-    /// Of the screw with the longest way; the others are slower, so that all arrive together.
+    /// Of the screw with the longest way; the others are slower, so that all arrive together. No screw goes faster than
+    /// `speed_mm_per_s` of the slowest axis either.
     #[schemars(range(min = 0.001, max = 1000.0), extend("x-range" = "at most the axes'"))]
     #[schemars(extend("x-own" = true))]
     pub speed_mm_per_s: f64,

@@ -1,5 +1,7 @@
 //! The handle of a platform.
 
+use units::AxisSpeed;
+
 use crate::connected::Machine;
 use crate::failure::Failure;
 use crate::handle::Core;
@@ -13,6 +15,8 @@ pub struct AlignmentPlatform<'m> {
     pub(crate) core: Core<'m>,
     pub(crate) config: &'m PlatformConfig,
     pub(crate) state: &'m mut PlatformState,
+    /// It moves no faster than so; an angular speed is of its turning.
+    pub(super) speed: Option<AxisSpeed>,
 }
 
 impl Machine {
@@ -29,6 +33,7 @@ impl Machine {
             core,
             config,
             state,
+            speed: None,
         })
     }
 }

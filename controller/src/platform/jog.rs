@@ -19,6 +19,7 @@ use crate::platform::config::PARTS;
 use crate::platform::failure::PlatformFailure;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::moves::Planned;
+use crate::platform::pace::screw_speed;
 use crate::runs::Place;
 
 /// Over so much of x, y (metres) or the angle (radians) it is seen how far the screws go for it.
@@ -46,6 +47,8 @@ pub(super) struct Reach<'p> {
     pub(super) kinematics: &'p Platform,
     /// So far short of its ends a jog stays: what stands there is still within them.
     pub(super) margin: Metres,
+    /// As fast as a screw may go.
+    pub(super) speed: MetresPerSecond,
 }
 
 impl PoseJog {
@@ -117,7 +120,7 @@ impl Reach<'_> {
 
     /// How fast `part` goes when its screws do as fast as they usually may.
     pub(super) fn usual_speed(&self, part: usize) -> f64 {
-        self.config.speed_mm_per_s * 1e-3 / self.screw_ratio(part)
+        self.speed.value() / self.screw_ratio(part)
     }
 
     fn margin_of(&self, part: usize) -> f64 {
@@ -149,6 +152,7 @@ impl AlignmentPlatform<'_> {
             config: self.config,
             kinematics: &self.state.kinematics,
             margin: margin(self.config, self.core.config),
+            speed: screw_speed(self.config, self.core.config),
         }
     }
 
@@ -192,11 +196,10 @@ impl AlignmentPlatform<'_> {
         let longest = longest.fold(Metres::ZERO, Metres::max).value();
         let speed = jog.speed.value().abs().min(usual);
         let pace = speed * longest / way.max(f64::MIN_POSITIVE);
-        let most = self.config.speed_mm_per_s * 1e-3;
         Ok(PlannedJog {
             target,
             screws,
-            pace: MetresPerSecond(pace.min(most)),
+            pace: MetresPerSecond(pace).min(reach.speed),
         })
     }
 
@@ -301,6 +304,7 @@ mod tests {
             config: platform,
             kinematics: &kinematics(platform, &config).unwrap(),
             margin: margin(platform, &config),
+            speed: screw_speed(platform, &config),
         });
     }
 

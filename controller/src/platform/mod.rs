@@ -26,6 +26,7 @@ mod look;
 mod mistaken;
 mod motion;
 pub(crate) mod moves;
+mod pace;
 pub(crate) mod record;
 mod runs;
 mod sound;

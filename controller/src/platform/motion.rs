@@ -3,7 +3,7 @@
 
 use compensator::platform::{Platform, Pose};
 use machine::records::Store;
-use units::{AxisSpeed, Metres};
+use units::{AxisSpeed, Metres, MetresPerSecond};
 
 use crate::correction::Correction;
 use crate::failure::Failure;
@@ -12,6 +12,7 @@ use crate::platform::handle::AlignmentPlatform;
 use crate::platform::jog::{PoseJog, Reach, margin, standing};
 use crate::platform::look::SeenPose;
 use crate::platform::moves::{PoseMoved, check_pose_of};
+use crate::platform::pace::screw_speed;
 use crate::platform::target::{NamedPose, places};
 use crate::platform::verify::{Aligned, alignment};
 use crate::runs::{GroupMove, Judging, Place};
@@ -62,6 +63,8 @@ pub(super) struct PlatformCourse {
     kinematics: Platform,
     /// So far short of the ends of its reach a jog stays.
     margin: Metres,
+    /// As fast as a screw may go.
+    speed: MetresPerSecond,
     /// The screws that have no calibration.
     without: Vec<String>,
 }
@@ -86,6 +89,7 @@ impl Judging for PlatformCourse {
             config: &self.config,
             kinematics: &self.kinematics,
             margin: self.margin,
+            speed: self.speed,
         };
         let from = standing(&self.kinematics, machine)?;
         Ok(Some(jog.place(reach.end_of(jog, from))))
@@ -130,6 +134,7 @@ impl AlignmentPlatform<'_> {
             config: self.config.clone(),
             kinematics: self.state.kinematics.clone(),
             margin: margin(self.config, self.core.config),
+            speed: screw_speed(self.config, self.core.config),
             without,
         }
     }

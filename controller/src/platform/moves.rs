@@ -51,6 +51,12 @@ pub(super) struct Planned {
     standard_uncertainty: Option<Metres>,
 }
 
+impl Planned {
+    pub(super) const fn set_point(&self) -> Metres {
+        self.set_point
+    }
+}
+
 impl AlignmentPlatform<'_> {
     /// Whether the platform may be told to be at `target`: by its work range and its screws'
     /// reach, without their calibrations. Asks no device.
@@ -219,7 +225,7 @@ impl AlignmentPlatform<'_> {
     /// Prepares every screw that has to travel, then starts all of them together; their speeds
     /// are such that they arrive together too.
     fn launch(&mut self, planned: &[Planned]) -> Result<Option<Duration>, Failure> {
-        let speed = MetresPerSecond(self.config.speed_mm_per_s * 1e-3);
+        let speed = self.pace(planned)?;
         let settle = Duration::from_millis(self.config.settle_ms.into());
         let moving = self.prepare(planned, speed)?;
         if moving.is_empty() {

@@ -64,7 +64,7 @@ fn refuse(task: &Task) -> Result<(), Failure> {
     }
     Err(Failure::Usage {
         what: "a platform that has drifted cannot be calibrated".into(),
-        help: "wait until the temperature has settled, or raise closure_limit_um".into(),
+        help: "wait until the temperature has settled".into(),
     })
 }
 

@@ -29,8 +29,10 @@ fn perform(
     if let Some(speed) = asked.jog {
         return jogged(machine, asked, speed);
     }
+    let speed = asked.speed;
     let asked = PoseAsked::of(asked);
     let mut platform = machine.platform().map_err(NotMoved::Before)?;
+    platform.speed = speed;
     let checked = platform.check_asked(store, &asked);
     checked.map_err(NotMoved::Before)?;
     let before = platform.look_for(&asked);

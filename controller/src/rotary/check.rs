@@ -309,6 +309,10 @@ fn check_drive(judge: &mut Judge<'_>, config: &MachineConfig, rotary: &RotaryCon
         }
     }
     check_following_error(judge, rotary);
+    if let Some(limit) = rotary.hold_limit_arcsec {
+        let window = ("position_window_arcsec", rotary.position_window_arcsec);
+        judge.at_least("hold_limit_arcsec", limit, window);
+    }
     rotary.node.check(judge, &config.can);
 }
 

@@ -98,6 +98,10 @@ pub struct RotaryConfig {
     pub following_error_limit_arcsec: f64,
     /// For how long it may be exceeded (0x6066).
     pub following_error_timeout_ms: u16,
+    /// How far a table that is on, and that nothing turns, may be from where it stood before it is stopped; a tenth of
+    /// `following_error_limit_arcsec` when left out, and `position_window_arcsec` at least.
+    #[schemars(range(min = 0.0001, max = 1000000.0), extend("x-range" = "at least `position_window_arcsec`"))]
+    pub hold_limit_arcsec: Option<f64>,
     /// How near its target the axis must be (0x6067).
     #[schemars(range(min = 0.0001, max = 100000.0))]
     pub position_window_arcsec: f64,

@@ -5,12 +5,8 @@ use compensator::rotary::{
 };
 use units::Radians;
 
-use crate::failure::advice::rounded_up;
 use crate::failure::in_use_text;
 use crate::failure::of_kind::KindFailure;
-
-/// The configuration takes no greater `slope_limit`.
-const SLOPE_LIMIT_MAX: f64 = 0.5;
 
 /// Why a rotary table did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -254,7 +250,7 @@ pub enum RotaryFailure {
         source: Misplaced,
     },
     /// A rotary table's error cannot be applied.
-    #[error("axis {axis}: {source}{}", advice(axis, source))]
+    #[error("axis {axis}: {source}{}", advice(source))]
     Compensation {
         /// Which axis.
         axis: String,
@@ -263,26 +259,19 @@ pub enum RotaryFailure {
     },
 }
 
-/// Which key would let a refused table pass, and whether that is wise.
-fn advice(axis: &str, refused: &PeriodicError) -> String {
-    let (key, number) = match refused {
-        PeriodicError::TooLarge { seen, .. } => {
-            ("size_limit_arcsec", rounded_up(seen.abs().arcsec()))
+/// What to look for where a table is refused.
+const fn advice(refused: &PeriodicError) -> &'static str {
+    match refused {
+        PeriodicError::TooLarge { .. } | PeriodicError::TooSteep { .. } => {
+            ". Look for a plate that was read or entered wrongly, a line that is damaged, a plate off its centre, then \
+             measure again"
         }
-        PeriodicError::TooSteep { seen, .. } if *seen < SLOPE_LIMIT_MAX => {
-            ("slope_limit", rounded_up(*seen))
-        }
-        PeriodicError::TooSteep { .. }
-        | PeriodicError::NotInvertible { .. }
+        PeriodicError::NotInvertible { .. }
         | PeriodicError::Limits { .. }
         | PeriodicError::TooFewLines { .. }
         | PeriodicError::Uncertainties { .. }
-        | PeriodicError::NotFinite { .. } => return String::new(),
-    };
-    format!(
-        "; `{key} = {number}` in [rotary.{axis}.compensation] would accept it, which is wise only where an error like that \
-         is expected of this table: of a plate that was read or entered wrongly it is none"
-    )
+        | PeriodicError::NotFinite { .. } => "",
+    }
 }
 
 impl KindFailure for RotaryFailure {

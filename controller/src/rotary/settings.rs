@@ -15,6 +15,7 @@ use wire::Port;
 
 use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
+use crate::hardware::drive::HOLD_SHARE;
 use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
 use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::{CHECKED, millis};
@@ -85,6 +86,7 @@ pub fn rotary_settings(
         )),
         position_window: Radians::from_arcsec(rotary.position_window_arcsec),
         position_window_time: millis(rotary.position_window_time_ms),
+        hold_limit: Some(hold_limit(rotary)),
         quick_stop_deceleration: Some(quick_stop),
         homing_acceleration: acceleration,
         stall_max: patience.beyond(usual.common.sync_period),
@@ -100,6 +102,13 @@ pub fn rotary_settings(
         ),
         ..usual
     }
+}
+
+/// How far it may be from where it stood while nothing turns it.
+fn hold_limit(rotary: &RotaryConfig) -> Radians {
+    let usual = HOLD_SHARE * rotary.following_error_limit_arcsec;
+    let limit = rotary.hold_limit_arcsec.unwrap_or(usual);
+    Radians::from_arcsec(limit.max(rotary.position_window_arcsec))
 }
 
 /// How long the index mark may be looked for: it comes once in a turn.

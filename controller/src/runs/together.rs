@@ -45,6 +45,8 @@ pub struct GroupMove {
     pub targets: Vec<(String, Place)>,
     /// What whoever asks agrees to.
     pub agreed: Agreed,
+    /// The greatest speed, along the way or of the turn; each axis goes no faster than it usually does either.
+    pub speed: Option<AxisSpeed>,
     /// Go on moving until what sees the body sees it there.
     pub align: bool,
     /// Runs on towards its only target at this speed, which says with its sign which way, until somebody stops it: a

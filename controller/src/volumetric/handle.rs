@@ -1,6 +1,6 @@
 //! The handle of a work volume.
 
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 use crate::connected::Machine;
 use crate::failure::Failure;
@@ -15,6 +15,8 @@ pub struct WorkVolume<'m> {
     pub(crate) core: Core<'m>,
     pub(crate) config: &'m VolumetricConfig,
     pub(crate) memories: &'m mut Memories,
+    /// The tool goes no faster than so where it follows no path.
+    pub(super) speed: Option<MetresPerSecond>,
 }
 
 impl Machine {
@@ -30,6 +32,7 @@ impl Machine {
             core,
             config,
             memories,
+            speed: None,
         })
     }
 }

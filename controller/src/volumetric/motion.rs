@@ -6,10 +6,11 @@ use core::time::Duration;
 use compensator::volumetric::{Point, Volume};
 use machine::engine::Live;
 use machine::records::Store;
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 use crate::connected::Machine;
 use crate::failure::Failure;
+use crate::jogging::along;
 use crate::memories::Memory;
 use crate::runs::{GroupMove, GroupMoved, GroupMoves, Judge, NotMoved, PartMoved, Place, Teller};
 use crate::volumetric::handle::WorkVolume;
@@ -215,6 +216,7 @@ impl VolumeCourse {
         if !self.is_measured {
             return Err(never_measured());
         }
+        tool_speed(asked)?;
         let mut rest = [Metres::ZERO; 3];
         for (rest, axis) in rest.iter_mut().zip(&self.axes) {
             if let Some(target) = asked.length(axis) {
@@ -227,6 +229,12 @@ impl VolumeCourse {
         let target = NamedPoint::of(&self.axes, asked).from(rest);
         Ok(check_in(&self.volume, self.reach, target)?)
     }
+}
+
+/// The greatest speed of the tool, where one is asked for.
+fn tool_speed(asked: &GroupMove) -> Result<Option<MetresPerSecond>, Failure> {
+    let speed = asked.speed.map(|speed| along(GEOMETRY, speed));
+    speed.transpose()
 }
 
 fn judge(machine: &mut Machine, store: &Store) -> Result<Judge, Failure> {
@@ -262,6 +270,7 @@ fn perform(
 ) -> Result<GroupMoved, NotMoved> {
     let mut volume = machine.volumetric().map_err(NotMoved::Before)?;
     let axes = volume.config().axes.clone();
+    volume.speed = tool_speed(asked).map_err(NotMoved::Before)?;
     let (ready, target) = prepare(&mut volume, store, asked).map_err(NotMoved::Before)?;
     let moved = volume.go_corrected(ready, target)?;
     let live = moved.live;

@@ -227,7 +227,7 @@ impl WorkVolume<'_> {
     ) -> Result<Live, Failure> {
         let Mover { engine, desk } = mover;
         if let Some(target) = target {
-            desk.move_to(&per_axis(target))?;
+            desk.move_within(&per_axis(target), self.speed)?;
         }
         let mut since = None;
         let mut last = None;

@@ -2,7 +2,7 @@
 
 use core::fmt;
 use core::time::Duration;
-use units::LengthOrAngle;
+use units::{AxisSpeed, Coordinate, Counts, LengthOrAngle, Quantity, Scale};
 use wire::canopen::NodeId;
 use wire::canopen::emcy::{Emergency, EmergencyCode};
 use wire::canopen::nmt::NmtState;
@@ -10,6 +10,7 @@ use wire::cia402::PowerState;
 use wire::copley::Faults;
 
 use super::DeviceName;
+use super::departure::{Asked, Departure};
 
 /// Something that must stop the machine, or at least be reported.
 ///
@@ -98,6 +99,44 @@ pub enum Alarm {
         jump: LengthOrAngle,
         limit: LengthOrAngle,
     },
+    /// The axis is where its request does not allow.
+    #[error(
+        "{device}: {} and is at {position:.3}, beyond {limit:.3}; look for {}",
+        moved_unasked(*asked), causes_of_motion(*asked)
+    )]
+    OutsideEnvelope {
+        device: DeviceName,
+        asked: Asked,
+        position: LengthOrAngle,
+        limit: LengthOrAngle,
+    },
+    /// The axis is faster than its request allows.
+    #[error(
+        "{device}: moved at {seen:.3} while asked {asked} at {limit:.3} at most; the drive counts \
+         speed in another unit (0x60A9, 0x608C, 0x6096), or its gear or encoder is set otherwise"
+    )]
+    TooFast {
+        device: DeviceName,
+        asked: Asked,
+        seen: AxisSpeed,
+        limit: AxisSpeed,
+    },
+    /// The drive is in another mode than it was given.
+    #[error(
+        "{node}: the drive is in mode {seen} (0x6061), was given mode {expected} (0x6060); does \
+         another master or program set it, or does the drive take a mode only when enabled?"
+    )]
+    WrongMode {
+        node: NodeId,
+        expected: i8,
+        seen: i8,
+    },
+    /// The drive is enabled without a command of this controller.
+    #[error(
+        "{device}: the drive is in operation enabled, and this controller did not enable it; look \
+         for another master or program, or a drive that enables itself"
+    )]
+    EnabledUnasked { device: DeviceName },
     /// The drive no longer latches, although this controller did not switch that off.
     #[error("{node}: the touch probe was switched off; does another program write 0x60B8?")]
     LatchDisarmed { node: NodeId },
@@ -160,7 +199,42 @@ pub enum Alarm {
     },
 }
 
+/// What an axis did that left its envelope.
+const fn moved_unasked(asked: Asked) -> &'static str {
+    match asked {
+        Asked::Hold => "the axis moves although it was asked to hold its place,",
+        Asked::Motion => "the axis left the way to its set-point",
+        Asked::Homing => "the search of its home met nothing",
+        Asked::Stop => "the axis does not stop",
+        Asked::Follow => "the axis left its set-points",
+    }
+}
+
+/// Where the cause of such a motion is looked for.
+const fn causes_of_motion(asked: Asked) -> &'static str {
+    match asked {
+        Asked::Homing => {
+            "a limit switch or index mark that is not connected, a search in the wrong direction, \
+             or a wrong gear or resolution of the drive"
+        }
+        Asked::Hold | Asked::Motion | Asked::Stop | Asked::Follow => {
+            "another master or program, a wrong gear or unit of the drive, or a force on the axis"
+        }
+    }
+}
+
 impl Alarm {
+    /// Whether a search of its home went farther than an axis can.
+    pub const fn is_endless_search(&self) -> bool {
+        matches!(
+            self,
+            Self::OutsideEnvelope {
+                asked: Asked::Homing,
+                ..
+            }
+        )
+    }
+
     /// Whether a drive says that its axis is farther from the demand than its limit permits.
     pub fn is_following_error(&self) -> bool {
         match self {
@@ -172,6 +246,38 @@ impl Alarm {
                 _ => false,
             },
             _ => false,
+        }
+    }
+}
+
+impl Departure {
+    /// What `device` reports of that; its counts are of `scale` and begin at `origin`.
+    pub(super) fn to_alarm<Q: Coordinate>(
+        self,
+        device: DeviceName,
+        scale: Scale<Q>,
+        origin: Counts,
+    ) -> Alarm {
+        let shown = |counts| scale.to_coordinate(Counts(counts) + origin).into();
+        let count = scale.resolution().abs().value();
+        let speed = |counts: f64| Q::Speed::from_value(counts * count).into();
+        match self {
+            Self::Place {
+                asked,
+                position,
+                limit,
+            } => Alarm::OutsideEnvelope {
+                device,
+                asked,
+                position: shown(position),
+                limit: shown(limit),
+            },
+            Self::Speed { asked, limit, seen } => Alarm::TooFast {
+                device,
+                asked,
+                seen: speed(seen),
+                limit: speed(limit),
+            },
         }
     }
 }

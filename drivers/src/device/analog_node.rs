@@ -76,7 +76,8 @@ impl AnalogNode {
         while let Some(event) = self.node.poll_event() {
             match event {
                 NodeEvent::Described(_) => self.node.configure(now, configuration()),
-                NodeEvent::Operational | NodeEvent::ScriptDone(_) => {}
+                NodeEvent::Operational => {}
+                NodeEvent::ScriptDone(_) => self.finish(Ok(())),
                 NodeEvent::Failed(error) => self.finish(Err(error)),
                 NodeEvent::Alarm(alarm) => {
                     let was_reset = matches!(alarm, Alarm::UnexpectedBootUp { .. });

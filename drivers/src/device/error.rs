@@ -7,7 +7,7 @@ use units::{LengthOrAngle, Short};
 use wire::canopen::nmt::NmtState;
 use wire::canopen::sdo::AbortCode;
 use wire::canopen::{NodeId, Object};
-use wire::cia402::PowerState;
+use wire::cia402::{NamedStatus, PowerState};
 use wire::copley::{ErrorCode, EventStatus, Faults, Parameter};
 
 use super::{Alarm, DeviceName};
@@ -103,6 +103,27 @@ pub enum DeviceError {
         node: NodeId,
         step: &'static str,
         state: PowerState,
+    },
+    /// The drive is not in the mode that it was given: it is not enabled, or was switched off.
+    #[error(
+        "{node}: not enabled, the drive shows mode {seen} (0x6061) and was given mode {expected} \
+         (0x6060); does another program set it, or does it take a mode only when enabled?"
+    )]
+    WrongMode {
+        node: NodeId,
+        expected: i8,
+        seen: i8,
+    },
+    /// A homing was called done, and the place shown has not become the home coordinate.
+    #[error(
+        "{node}: not homed, the drive calls homing attained, but shows {shown:.3} in place of \
+         {home:.3}; does 0x607C mean the position at home to this drive, or are its bits those \
+         of a homing before?"
+    )]
+    NotAtHome {
+        node: NodeId,
+        shown: LengthOrAngle,
+        home: LengthOrAngle,
     },
     /// A condition that the command needs is not met.
     #[error("{device}: {step} needs {needs}")]
@@ -242,7 +263,7 @@ pub enum Seen {
     Nothing,
     Nmt(NmtState),
     Power(PowerState),
-    Statusword(u16),
+    Statusword(NamedStatus),
     Mode(i8),
     Position(LengthOrAngle),
     Samples(u32),
@@ -255,7 +276,7 @@ impl fmt::Display for Seen {
             Self::Nothing => f.write_str("nothing"),
             Self::Nmt(state) => state.fmt(f),
             Self::Power(state) => state.fmt(f),
-            Self::Statusword(raw) => write!(f, "statusword {raw:#06X}"),
+            Self::Statusword(status) => status.fmt(f),
             Self::Mode(raw) => write!(f, "mode {raw}"),
             Self::Position(at) => write!(f, "position {at:.6}"),
             Self::Samples(count) => write!(f, "{count} samples"),

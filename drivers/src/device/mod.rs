@@ -12,7 +12,9 @@ pub mod cia402;
 pub mod cia404;
 pub mod copley;
 pub mod dcon;
+mod departure;
 mod direction;
+mod envelope;
 mod error;
 #[cfg(test)]
 mod fake_node;
@@ -36,7 +38,9 @@ use wire::Payload;
 use wire::cia402::PowerState;
 
 pub use alarm::{Alarm, AmplifierTrouble, OwnAlarm};
+pub use departure::Asked;
 pub use direction::Direction;
+pub use envelope::TRAVEL_MARGIN;
 pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use name::DeviceName;
@@ -80,6 +84,12 @@ pub trait Device {
         None
     }
 
+    /// Begins to end the device's watch on the heartbeat of this controller, which is about to end.
+    /// `false`: it watches none. [`Device::poll_outcome`] says when the watch has ended.
+    fn release_watch(&mut self, _now: Time) -> bool {
+        false
+    }
+
     /// How the last command (or the start) went, once, when it has ended.
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>>;
 
@@ -101,6 +111,17 @@ pub trait ServoDrive: Device {
 
     /// Whether the drive has a reference since it was last powered.
     fn is_homed(&self) -> bool;
+
+    /// Whether the drive stops by itself once it no longer hears us: its watch on our heartbeat was written and read
+    /// back since it was started.
+    fn watches_master(&self) -> bool {
+        false
+    }
+
+    /// Whether it was commanded towards operation enabled, or found enabled, since it was started.
+    fn was_enabled(&self) -> bool {
+        true
+    }
 
     /// Whether it is configured how the drive proves that it kept its reference.
     fn proves_reference(&self) -> bool {

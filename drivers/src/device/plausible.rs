@@ -6,11 +6,13 @@ use units::Counts;
 
 /// An axis stands when so many positions in a row lie within the tolerance.
 const STANDING: u8 = 3;
+/// So many leave no doubt, whatever the drive says.
+const STANDING_LONG: u8 = 20;
 /// How much faster than it may go an axis can be for a moment.
 const OVERSHOOT: f64 = 1.2;
 
 /// What a position is worth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Judgement {
     Believed,
     /// Too far from where the axis can be: not taken.
@@ -19,6 +21,12 @@ pub(super) enum Judgement {
     Jumped {
         by: Counts,
         limit: Counts,
+    },
+    /// Twice too far in one direction: the axis moves at `seen` counts per second, `limit` at most
+    /// is possible.
+    TooFast {
+        seen: f64,
+        limit: f64,
     },
 }
 
@@ -31,7 +39,8 @@ pub(super) struct Plausible {
     /// Where the axis was when it last seemed to come to rest.
     rest: Counts,
     standing: u8,
-    doubted: bool,
+    /// How far the last position was off, when that was too far.
+    doubted: Option<Counts>,
     /// While homing the coordinates may change.
     jumps_allowed: bool,
     rejected: u64,
@@ -46,7 +55,7 @@ impl Plausible {
             tolerance,
             rest: Counts(0),
             standing: 0,
-            doubted: false,
+            doubted: None,
             jumps_allowed: false,
             rejected: 0,
         }
@@ -66,6 +75,11 @@ impl Plausible {
         self.standing >= STANDING
     }
 
+    /// Whether they have lain together for long.
+    pub(super) const fn stands_long(&self) -> bool {
+        self.standing >= STANDING_LONG
+    }
+
     /// From now on positions begin a new count of standing still.
     pub(super) const fn watch_rest(&mut self) {
         self.standing = 0;
@@ -73,21 +87,24 @@ impl Plausible {
 
     pub(super) const fn allow_jumps(&mut self, allowed: bool) {
         self.jumps_allowed = allowed;
-        self.doubted = false;
+        self.doubted = None;
     }
 
     /// Nothing before compares with what comes.
     pub(super) const fn forget(&mut self) {
         self.standing = 0;
-        self.doubted = false;
+        self.doubted = None;
     }
 
     /// Judges `position`, up to `apart` after the position `old`, if there is one. What is not
     /// doubted is taken.
     pub(super) fn take(&mut self, position: Counts, old: Option<(Counts, Duration)>) -> Judgement {
         let judgement = self.judge(position, old);
-        self.doubted = judgement == Judgement::Doubted;
-        if self.doubted {
+        self.doubted = match (judgement, old) {
+            (Judgement::Doubted, Some((old, _))) => Some(position - old),
+            _ => None,
+        };
+        if self.doubted.is_some() {
             self.rejected += 1;
             return judgement;
         }
@@ -104,15 +121,23 @@ impl Plausible {
         let Some((old, apart)) = old.filter(|_| !self.jumps_allowed) else {
             return Judgement::Believed;
         };
-        let limit = (self.speed_max * OVERSHOOT * apart.as_secs_f64()) as i64 + self.margin;
+        let seconds = apart.as_secs_f64();
+        let limit = (self.speed_max * OVERSHOOT * seconds) as i64 + self.margin;
         let by = position - old;
         if by.0.abs() <= limit {
-            Judgement::Believed
-        } else if self.doubted {
-            let limit = Counts(limit);
-            Judgement::Jumped { by, limit }
-        } else {
-            Judgement::Doubted
+            return Judgement::Believed;
         }
+        let Some(before) = self.doubted else {
+            return Judgement::Doubted;
+        };
+        // A position that jumped stays; an axis that is too fast goes on.
+        let went_on = (by - before).0;
+        if went_on.signum() == before.0.signum() && went_on.abs() > before.0.abs() / 2 {
+            let seen = by.0.abs() as f64 / seconds;
+            let limit = self.speed_max;
+            return Judgement::TooFast { seen, limit };
+        }
+        let limit = Counts(limit);
+        Judgement::Jumped { by, limit }
     }
 }

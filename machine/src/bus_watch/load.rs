@@ -30,6 +30,8 @@ pub(super) struct Load {
     now: Window,
     /// How old the last thing was that was heard, when it was heard.
     lag: Duration,
+    /// Who took the largest share of a whole window since this was asked for.
+    peak: Option<Loudest>,
 }
 
 impl Load {
@@ -40,7 +42,19 @@ impl Load {
             before: Window::default(),
             now: Window::default(),
             lag: Duration::ZERO,
+            peak: None,
         }
+    }
+
+    /// Looks for the largest share from now on.
+    pub(super) fn forget_peak(&mut self) {
+        self.peak = None;
+    }
+
+    /// Who took the largest share of the bus in a window since [`Load::forget_peak`], or takes it now.
+    pub(super) fn peak(&self, now: Time) -> Option<Loudest> {
+        let both = self.peak.clone().into_iter().chain(self.loudest(now));
+        both.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
     /// Counts `frame`, which arrived at `at` and is looked at now.
@@ -58,6 +72,7 @@ impl Load {
     fn reach(&mut self, at: Time, now: Time) {
         self.lag = now.since(at);
         if at.since(self.now.since) >= self.window {
+            self.peak = self.peak(now);
             core::mem::swap(&mut self.before, &mut self.now);
             self.now.begin(at);
         }

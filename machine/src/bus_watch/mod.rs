@@ -14,13 +14,13 @@ use std::collections::BTreeMap;
 use drivers::device::{Alarm, DeviceError};
 use drivers::transport::SendError;
 use units::Time;
-use wire::can::CanFrame;
+use wire::can::{CanFrame, CanId};
 use wire::canopen::nmt::{NMT_COB_ID, NmtCommand};
 use wire::canopen::sdo::SdoRequest;
 use wire::canopen::{Function, NodeId};
 use wire::{Arrival, Input, Payload, Port};
 
-use self::load::Load;
+use self::load::{Load, Loudest};
 use crate::engine::EngineFailure;
 use crate::failure::Failure;
 use crate::parts;
@@ -97,26 +97,70 @@ impl BusWatch {
         }
     }
 
+    /// Counts what came in while everything is stopped, and judges nothing.
+    pub(crate) fn count(&mut self, arrival: &Arrival, now: Time) {
+        if let Some(bus) = self.buses.get_mut(&arrival.port)
+            && let Input::Payload(Payload::Frame(frame)) = &arrival.input
+        {
+            bus.load.count(arrival.at, now, frame);
+        }
+    }
+
+    /// Something failed: the largest share of each bus is looked for from now on.
+    pub(crate) fn ask(&mut self) {
+        self.buses
+            .values_mut()
+            .for_each(|bus| bus.load.forget_peak());
+    }
+
     /// The failure, or, when something did not come because somebody fills the bus, that.
     pub(crate) fn explain(&self, now: Time, failure: Failure) -> Failure {
-        if !is_absence(&failure) {
-            return failure;
-        }
-        let buses = self.buses.values();
-        let loudest = buses.filter_map(|bus| Some((bus, bus.load.loudest(now)?)));
-        match loudest.max_by(|(_, a), (_, b)| a.share.total_cmp(&b.share)) {
-            Some((bus, it)) if it.share > SHARE_MAX => Failure::Babbling {
-                port: bus.name.clone(),
-                id: it.id,
-                percent: (it.share * 100.0).min(100.0),
-                missing: Box::new(failure),
-            },
+        let loudest = |bus: &Bus| bus.load.loudest(now);
+        match self.talker(loudest) {
+            Some((bus, talker)) if is_absence(&failure) => bus.babbling(&talker, failure),
             _ => failure,
         }
+    }
+
+    /// Who has filled a bus since [`BusWatch::ask`], as far as that explains `failure`: what a node sends under a
+    /// number for which `is_own` holds may be false, and nothing else.
+    ///
+    /// # Errors
+    /// The failure itself when that is no explanation.
+    pub(crate) fn explain_by_peak(
+        &self,
+        now: Time,
+        failure: Failure,
+        is_own: impl Fn(CanId) -> bool,
+    ) -> Result<Failure, Failure> {
+        let peak = |bus: &Bus| bus.load.peak(now);
+        match self.talker(peak) {
+            Some((bus, talker)) if is_absence(&failure) || is_own(talker.id) => {
+                Ok(bus.babbling(&talker, failure))
+            }
+            _ => Err(failure),
+        }
+    }
+
+    /// The loudest sender of all buses, when it leaves no room for others.
+    fn talker(&self, loudest: impl Fn(&Bus) -> Option<Loudest>) -> Option<(&Bus, Loudest)> {
+        let buses = self.buses.values();
+        let each = buses.filter_map(|bus| Some((bus, loudest(bus)?)));
+        let first = each.max_by(|(_, a), (_, b)| a.share.total_cmp(&b.share));
+        first.filter(|(_, talker)| talker.share > SHARE_MAX)
     }
 }
 
 impl Bus {
+    fn babbling(&self, talker: &Loudest, failure: Failure) -> Failure {
+        Failure::Babbling {
+            port: self.name.clone(),
+            id: talker.id,
+            percent: (talker.share * 100.0).min(100.0),
+            missing: Box::new(failure),
+        }
+    }
+
     fn judge(&mut self, frame: &CanFrame) -> Result<Option<String>, Failure> {
         let Some(cob_id) = frame.standard_id() else {
             return Ok(None);
@@ -189,7 +233,7 @@ fn masters_own(bus: &parts::Bus) -> BTreeMap<u16, &'static str> {
 }
 
 /// Whether something failed to come or to go.
-const fn is_absence(failure: &Failure) -> bool {
+pub(crate) const fn is_absence(failure: &Failure) -> bool {
     matches!(
         failure,
         Failure::Overdue { .. }

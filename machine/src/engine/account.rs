@@ -3,7 +3,7 @@
 
 use compensator::apply::Alarm;
 use compensator::volumetric::online::Spot;
-use units::{Metres, Time};
+use units::{Metres, MetresPerSecond, Time};
 
 use super::PerAxis;
 use super::cause::Cause;
@@ -14,7 +14,8 @@ pub(super) enum Command {
     Stop,
     Correct(bool),
     Swap(Box<dyn Correction>),
-    MoveTo(PerAxis<Metres>),
+    /// All axes together no faster than so, where that is said.
+    MoveTo(PerAxis<Metres>, Option<MetresPerSecond>),
 }
 
 /// What the loop is doing.

@@ -8,7 +8,7 @@ use core::any::Any;
 use core::time::Duration;
 
 use rtrb::{Consumer, Producer};
-use units::{Metres, Time};
+use units::{Metres, MetresPerSecond, Time};
 
 use super::account::{Command, Counts, Heard, Live, State, Trouble};
 use super::cause::Cause;
@@ -282,7 +282,7 @@ impl Core {
                         core::mem::forget(before);
                     }
                 }
-                Command::MoveTo(target) => self.begin_move(&target)?,
+                Command::MoveTo(target, speed) => self.begin_move(&target, speed)?,
             }
         }
         if self.lines.commands.is_abandoned() && self.lines.path.is_abandoned() {
@@ -297,12 +297,16 @@ impl Core {
     /// On the fly: from whatever the axes do now. A target that cannot be is refused where it is
     /// given; one for which there is no way all the same stops the axes, because the plan that
     /// they followed is lost.
-    fn begin_move(&mut self, target: &PerAxis<Metres>) -> Result<(), Trouble> {
+    fn begin_move(
+        &mut self,
+        target: &PerAxis<Metres>,
+        speed: Option<MetresPerSecond>,
+    ) -> Result<(), Trouble> {
         if let State::Stopping(_) | State::Stopped(_) = self.state {
             return Ok(());
         }
         let from = self.moment();
-        if let Err(error) = self.motion.plan_to(&from, target) {
+        if let Err(error) = self.motion.plan_within(&from, target, speed) {
             return self.stop(Cause::of_refusal(&error));
         }
         self.drop_all();

@@ -20,6 +20,7 @@ fn limits() -> AxisLimits {
         min: Metres::from_mm(-10.0),
         max: Metres::from_mm(60.0),
         speed: MetresPerSecond(SPEED),
+        move_speed: MetresPerSecond(SPEED),
         acceleration: MetresPerSecondSquared(ACCELERATION),
         jerk: MetresPerSecondCubed(JERK),
         deviation: Metres::from_um(50.0),
@@ -44,12 +45,26 @@ impl Bench {
     }
 
     fn with(correction: Box<dyn Correction>) -> Self {
+        Self::of(limits(), correction)
+    }
+
+    /// Whose moves are a tenth as fast as its paths may be.
+    fn slow() -> Self {
+        let move_speed = MetresPerSecond(0.1 * SPEED);
+        let limits = AxisLimits {
+            move_speed,
+            ..limits()
+        };
+        Self::of(limits, Box::new(NoCorrection))
+    }
+
+    fn of(limits: AxisLimits, correction: Box<dyn Correction>) -> Self {
         let of_correction = [CorrectionLimits {
             size: Metres::from_um(30.0),
             rate: MetresPerSecond(1e-3),
         }; AXES_MAX];
         let names = ["x", "y"].map(str::to_owned).to_vec();
-        let limits = [limits(); AXES_MAX];
+        let limits = [limits; AXES_MAX];
         let (mut engine, desk) =
             Engine::assemble(names, PERIOD, limits, &of_correction, correction);
         engine.core.begin([Metres::ZERO; AXES_MAX]);
@@ -284,6 +299,72 @@ fn moves_are_planned_anew_on_the_fly_without_a_step() {
     assert!(error.to_string().contains("60.001"), "{error}");
 }
 
+/// The greatest speed of the set-points of axis 0 from `begin` to `end`, by differences.
+fn greatest_speed(bench: &Bench, begin: usize, end: usize) -> f64 {
+    let sent = bench.sent[begin..end].windows(2);
+    let speeds = sent.map(|pair| (pair[1][0] - pair[0][0]).value().abs() / T);
+    speeds.fold(0.0, f64::max)
+}
+
+#[test]
+fn moves_and_run_ups_keep_the_speed_of_moves() {
+    let mut bench = Bench::slow();
+    bench.desk.move_to(&mm(20.0, 0.0)).unwrap();
+    bench.periods(800);
+    assert_eq!(bench.last(0), Metres::from_mm(20.0));
+    circle(480).for_each(|point| bench.desk.path.push(&point).unwrap());
+    bench.desk.path.finish().unwrap();
+    while bench.engine.state() != State::Following {
+        bench.periods(1);
+    }
+    let begun = bench.sent.len();
+    assert_eq!(bench.until_rest(), Cause::PathDone);
+    bench.check_smooth();
+    let moved = greatest_speed(&bench, 0, begun);
+    assert!((0.098..=0.1001).contains(&(moved / SPEED)), "{moved} m/s");
+    let driven = greatest_speed(&bench, begun, bench.sent.len());
+    assert!(driven > 0.5 * SPEED, "a path is faster: {driven} m/s");
+}
+
+#[test]
+fn a_move_off_a_faster_path_stops_first() {
+    let mut bench = Bench::slow();
+    circle(480).for_each(|point| bench.desk.path.push(&point).unwrap());
+    while bench.engine.state() != State::Following {
+        bench.periods(1);
+    }
+    bench.periods(200);
+    let begun = bench.sent.len();
+    bench.desk.move_to(&mm(0.0, 0.0)).unwrap();
+    bench.periods(1500);
+    bench.check_smooth();
+    assert_eq!([bench.last(0), bench.last(1)], mm(0.0, 0.0));
+    assert!(greatest_speed(&bench, begun, begun + 10) > 0.5 * SPEED);
+    let moved = greatest_speed(&bench, begun + 150, bench.sent.len());
+    assert!(moved <= 0.1001 * SPEED, "{moved} m/s");
+}
+
+#[test]
+fn a_move_keeps_the_speed_that_is_asked_for_along_its_line() {
+    let mut bench = Bench::slow();
+    let speed = MetresPerSecond(0.05 * SPEED);
+    bench
+        .desk
+        .move_within(&mm(20.0, 20.0), Some(speed))
+        .unwrap();
+    bench.periods(1500);
+    assert_eq!([bench.last(0), bench.last(1)], mm(20.0, 20.0));
+    let each = greatest_speed(&bench, 0, bench.sent.len());
+    let along = each * core::f64::consts::SQRT_2;
+    assert!((0.049..=0.0501).contains(&(along / SPEED)), "{along} m/s");
+    // The next one that names none is as fast as moves are.
+    bench.desk.move_to(&mm(0.0, 20.0)).unwrap();
+    let begun = bench.sent.len();
+    bench.periods(800);
+    let moved = greatest_speed(&bench, begun, bench.sent.len());
+    assert!((0.098..=0.1001).contains(&(moved / SPEED)), "{moved} m/s");
+}
+
 #[test]
 fn a_move_from_rest_is_a_straight_line() {
     let mut bench = Bench::new();
@@ -375,7 +456,7 @@ fn a_target_without_a_way_stops_the_axes() {
     // Past the desk, which would have refused it.
     let mut beyond = [Metres::ZERO; AXES_MAX];
     beyond[1] = Metres::from_mm(99.0);
-    bench.desk.order(Command::MoveTo(beyond)).unwrap();
+    bench.desk.order(Command::MoveTo(beyond, None)).unwrap();
     assert_eq!(bench.until_rest(), Cause::PathRefused { axis: 1 });
     bench.check_smooth();
     assert!(bench.last(0) < Metres::from_mm(40.0));

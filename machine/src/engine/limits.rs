@@ -11,6 +11,8 @@ pub struct AxisLimits {
     pub max: Metres,
     /// The greatest speed.
     pub speed: MetresPerSecond,
+    /// The greatest speed of a motion that is no path: a move, the way to the first point of a path.
+    pub move_speed: MetresPerSecond,
     /// The greatest acceleration, and deceleration of a controlled stop.
     pub acceleration: MetresPerSecondSquared,
     /// The greatest jerk.

@@ -264,8 +264,20 @@ impl Desk {
     /// # Errors
     /// When the target is outside the soft limits, or nobody takes the order.
     pub fn move_to(&mut self, target: &[Metres]) -> Result<(), Failure> {
+        self.move_within(target, None)
+    }
+
+    /// The same, with all axes together no faster than `speed`; axes that move come to rest first.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn move_within(
+        &mut self,
+        target: &[Metres],
+        speed: Option<MetresPerSecond>,
+    ) -> Result<(), Failure> {
         let all = self.check_target(target)?;
-        Ok(self.order(Command::MoveTo(all))?)
+        Ok(self.order(Command::MoveTo(all, speed))?)
     }
 
     /// Whether the axes could be moved to `target`.

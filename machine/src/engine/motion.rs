@@ -11,7 +11,7 @@
 
 use core::time::Duration;
 
-use units::Metres;
+use units::{Metres, MetresPerSecond};
 
 use super::moment::Moment;
 use super::planner::{Leg, Planner, Refusal};
@@ -61,6 +61,7 @@ impl From<Refusal> for MotionError {
 /// let x = AxisLimits {
 ///     max: Metres(0.1),
 ///     speed: MetresPerSecond(0.1),
+///     move_speed: MetresPerSecond(0.1),
 ///     acceleration: MetresPerSecondSquared(1.0),
 ///     jerk: MetresPerSecondCubed(10.0),
 ///     ..AxisLimits::default()
@@ -117,16 +118,30 @@ impl Motion {
         from: &Moment,
         target: &PerAxis<Metres>,
     ) -> Result<Duration, MotionError> {
+        self.plan_within(from, target, None)
+    }
+
+    /// The same, with all axes together no faster than `speed`.
+    ///
+    /// # Errors
+    /// As [`Self::plan_to`].
+    pub fn plan_within(
+        &mut self,
+        from: &Moment,
+        target: &PerAxis<Metres>,
+        speed: Option<MetresPerSecond>,
+    ) -> Result<Duration, MotionError> {
         self.check(target)?;
         self.target = Some(*target);
         self.pausing = 0.0;
         if from.is_rest() {
-            self.planner.line(&from.position, target, &mut self.way)?;
-        } else if self.planner.way(from, target, &mut self.way).is_err() {
+            let (planner, way) = (&mut self.planner, &mut self.way);
+            planner.line(&from.position, target, speed, way)?;
+        } else if speed.is_some() || self.planner.way(from, target, &mut self.way).is_err() {
             self.planner.stop(from, &mut self.pause)?;
             self.pausing = self.pause.seconds();
             let rest = self.pause.at(self.pausing).position;
-            self.planner.line(&rest, target, &mut self.way)?;
+            self.planner.line(&rest, target, speed, &mut self.way)?;
         }
         self.lasts()
     }
@@ -199,15 +214,17 @@ mod tests {
 
     /// Whatever precision stages may be set to, each axis by itself.
     fn limits() -> impl Strategy<Value = PerAxis<AxisLimits>> {
-        let one = (-3.0..0.5_f64, -2.0..1.5_f64, -1.0..4.0_f64);
+        let share = prop_oneof![Just(0.0), -3.0..0.0_f64];
+        let one = (-3.0..0.5_f64, share, -2.0..1.5_f64, -1.0..4.0_f64);
         [one.clone(), one.clone(), one].prop_map(|axes| {
             let mut limits = PerAxis::default();
-            for (limit, (speed, acceleration, jerk)) in limits.iter_mut().zip(axes) {
+            for (limit, (speed, move_share, acceleration, jerk)) in limits.iter_mut().zip(axes) {
                 let power = |exponent: f64| 10.0_f64.powf(exponent);
                 *limit = AxisLimits {
                     min: Metres(-2.0),
                     max: Metres(2.0),
                     speed: MetresPerSecond(power(speed)),
+                    move_speed: MetresPerSecond(power(speed + move_share)),
                     acceleration: MetresPerSecondSquared(power(acceleration)),
                     jerk: MetresPerSecondCubed(power(jerk)),
                     deviation: Metres::ZERO,
@@ -266,6 +283,7 @@ mod tests {
             for (axis, limit) in motion.limits.iter().enumerate().take(AXES) {
                 let AxisLimits {
                     speed,
+                    move_speed,
                     acceleration,
                     jerk,
                     ..
@@ -283,6 +301,10 @@ mod tests {
                 assert_most(gained.value(), acceleration.value() * seconds, "gain", at);
                 assert_most(now.speed[axis].value(), speed.value(), "speed", at);
                 assert_most(moved.value(), speed.value() * seconds, "way", at);
+                // A stop may begin on a path, which is faster than a move.
+                if motion.target.is_some() && (step * at).as_secs_f64() >= motion.pausing {
+                    assert_most(now.speed[axis].value(), move_speed.value(), "move", at);
+                }
             }
             before = now;
         }
@@ -347,6 +369,31 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn axes_together_keep_the_speed_that_is_asked_for(
+            limits in limits(),
+            from in shares(),
+            to in shares(),
+            speed in -6.0..0.5_f64,
+        ) {
+            let from = begin(&limits, from);
+            let target = begin(&limits, to).position;
+            let speed = 10.0_f64.powf(speed);
+            let mut motion = Motion::new(AXES, limits);
+            let within = Some(MetresPerSecond(speed));
+            let duration = motion.plan_within(&from, &target, within).unwrap();
+            check(&motion, &from, duration);
+            let pausing = Duration::from_secs_f64(motion.pausing);
+            for at in 0..100 {
+                let now = motion.at(pausing + (duration - pausing) * at / 100);
+                let squares = (0..AXES).map(|axis| now.speed[axis].value().powi(2));
+                assert_most(squares.sum::<f64>().sqrt(), speed, "together", at);
+            }
+            prop_assert_eq!(motion.at(duration + Duration::from_secs(1)).position, target);
+        }
+    }
+
     /// Found by chance: rsruckig 3.0.1 lets the first axis jerk beyond its limit.
     #[test]
     fn where_the_planner_knows_no_way_the_axes_stop_first() {
@@ -354,6 +401,7 @@ mod tests {
             min: Metres(-1.0),
             max: Metres(1.0),
             speed: MetresPerSecond(speed),
+            move_speed: MetresPerSecond(speed),
             acceleration: MetresPerSecondSquared(acceleration),
             jerk: MetresPerSecondCubed(jerk),
             deviation: Metres::ZERO,

@@ -38,6 +38,13 @@ impl Rates {
         }
     }
 
+    fn of_move(limits: &AxisLimits) -> Self {
+        Self {
+            speed: limits.move_speed.value(),
+            ..Self::of(limits)
+        }
+    }
+
     /// Of what goes so many times as fast as what these belong to.
     fn shared_by(self, share: f64) -> Self {
         Self {
@@ -74,12 +81,31 @@ impl Scale {
     const LENGTH: f64 = 256.0;
     /// At most, and more than a quarter of it.
     const ACCELERATION: f64 = 128.0;
+    /// At most where the unit of time is that of a long way.
+    const JERK: f64 = 1e6;
+    /// rsruckig 3.0.1 refuses what lasts longer than 7600 of its units of time.
+    const LASTING: f64 = 7000.0;
 
     fn of(reached_acceleration: f64) -> Self {
         let time = (Self::ACCELERATION / (Self::LENGTH * reached_acceleration)).sqrt();
         Self {
             time: power_of_two_below(time),
         }
+    }
+
+    /// The scale of a way of so many metres at `rates`. One that lasts for hours begins and ends more gently, so that the
+    /// planner takes its numbers.
+    fn of_way(length: f64, rates: &mut Rates) -> Self {
+        let usual = Self::of(rates.reached_acceleration());
+        let long = Self {
+            time: power_of_two_below(2.0 * length / rates.speed / Self::LASTING),
+        };
+        if long.time <= usual.time {
+            return usual;
+        }
+        rates.acceleration = rates.acceleration.min(Self::ACCELERATION / long.factor(2));
+        rates.jerk = rates.jerk.min(Self::JERK / long.factor(3));
+        long
     }
 
     /// Of a quantity that has so many seconds below its fraction bar.
@@ -152,7 +178,10 @@ impl Leg {
 /// Plans ways of some axes. Asks for no memory, except for the text of a refusal.
 pub(super) struct Planner {
     axes: usize,
+    /// Of a stop, which may begin on a path.
     rates: PerAxis<Rates>,
+    /// Of a motion that is no path.
+    move_rates: PerAxis<Rates>,
     ruckig: Ruckig<AXES_MAX, ThrowErrorHandler>,
     /// In which the ways of all axes are reckoned.
     scale: Scale,
@@ -166,6 +195,7 @@ impl Planner {
     /// Of the first `axes` of `limits`, at most [`AXES_MAX`].
     pub(super) fn new(axes: usize, limits: PerAxis<AxisLimits>) -> Self {
         let rates = limits.each_ref().map(Rates::of);
+        let move_rates = limits.each_ref().map(Rates::of_move);
         let reached = rates[..axes].iter().map(Rates::reached_acceleration);
         let scale = Scale::of(reached.fold(0.0, f64::max));
         let mut input = InputParameter::new(None);
@@ -178,6 +208,7 @@ impl Planner {
         Self {
             axes,
             rates,
+            move_rates,
             // Only motions that are looked up by time are made: the step counts for nothing.
             ruckig: Ruckig::new(None, 1.0),
             scale,
@@ -187,18 +218,19 @@ impl Planner {
     }
 
     /// Along the straight line from rest at `from` to rest at `to`, as fast as no axis goes beyond
-    /// its limits.
+    /// its limits, and all together no faster than `speed`.
     pub(super) fn line(
         &mut self,
         from: &PerAxis<Metres>,
         to: &PerAxis<Metres>,
+        speed: Option<MetresPerSecond>,
         leg: &mut Leg,
     ) -> Result<(), Refusal> {
         let goes = |axis: usize| (to[axis] - from[axis]).value();
         let length = (0..self.axes).map(|axis| goes(axis).abs());
         let length = length.fold(0.0, f64::max);
         let mut shares = [0.0; AXES_MAX];
-        let mut rates = self.rates[0];
+        let mut rates = self.move_rates[0];
         if length > 0.0 {
             for (axis, share) in shares.iter_mut().enumerate().take(self.axes) {
                 *share = goes(axis) / length;
@@ -209,10 +241,14 @@ impl Planner {
                 jerk: f64::INFINITY,
             };
             rates = (0..self.axes)
-                .map(|axis| self.rates[axis].shared_by(shares[axis].abs()))
+                .map(|axis| self.move_rates[axis].shared_by(shares[axis].abs()))
                 .fold(unlimited, Rates::least);
         }
-        leg.scale = Scale::of(rates.reached_acceleration());
+        if let Some(speed) = speed {
+            let along = shares.iter().map(|share| share * share).sum::<f64>().sqrt();
+            rates.speed = rates.speed.min(speed.value() / along.max(1.0));
+        }
+        leg.scale = Scale::of_way(length, &mut rates);
         leg.line = Some(Line {
             from: *from,
             shares,
@@ -223,13 +259,19 @@ impl Planner {
     }
 
     /// From whatever the axes do to rest at `to`, all at the same time. What the planner found is
-    /// not taken where it goes beyond the limits.
+    /// not taken where it goes beyond the limits. There is none for axes that are faster than a move.
     pub(super) fn way(
         &mut self,
         from: &Moment,
         to: &PerAxis<Metres>,
         leg: &mut Leg,
     ) -> Result<(), Refusal> {
+        let is_faster =
+            |axis: &usize| from.speed[*axis].value().abs() > self.move_rates[*axis].speed;
+        if let Some(axis) = (0..self.axes).find(is_faster) {
+            return Err(format!("axis {axis} is faster than a move may be"));
+        }
+        self.limit_speeds(self.move_rates);
         self.begin_at(from, leg);
         for (axis, wanted) in to.iter().enumerate().take(self.axes) {
             self.input.target_position[axis] = wanted.value() * leg.scale.factor(0);
@@ -247,6 +289,7 @@ impl Planner {
 
     /// From whatever the axes do to rest as soon as possible, each axis by itself.
     pub(super) fn stop(&mut self, from: &Moment, leg: &mut Leg) -> Result<(), Refusal> {
+        self.limit_speeds(self.rates);
         self.begin_at(from, leg);
         self.input.control_interface = ControlInterface::Velocity;
         // Where axes that are made to stop at one moment have a speed near zero and an
@@ -254,6 +297,12 @@ impl Planner {
         // wanted in any case.
         self.input.synchronization = Synchronization::None;
         calculate(&mut self.ruckig, &self.input, leg)
+    }
+
+    fn limit_speeds(&mut self, rates: PerAxis<Rates>) {
+        for (axis, rates) in rates.iter().enumerate() {
+            limit(&mut self.input, axis, rates, self.scale);
+        }
     }
 
     fn begin_at(&mut self, from: &Moment, leg: &mut Leg) {

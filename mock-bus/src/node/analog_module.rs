@@ -53,7 +53,7 @@ pub struct Module<'a> {
 }
 
 /// What a profile makes of a module.
-pub trait Profile {
+pub trait Profile: Send {
     /// What it is like apart from its profile.
     fn module(&self) -> Module<'_>;
 
@@ -174,7 +174,9 @@ impl<P: Profile> AnalogModule<P> {
                 | ServerEvent::Nmt(_)
                 | ServerEvent::ResetNode
                 | ServerEvent::ResetCommunication => self.schedule(now),
-                ServerEvent::HeartbeatLost(_) | ServerEvent::HeartbeatBack(_) => {}
+                ServerEvent::HeartbeatLost(_)
+                | ServerEvent::HeartbeatBack(_)
+                | ServerEvent::RpdoLost => {}
             }
         }
     }

@@ -38,7 +38,7 @@ use umd2_interferometer::Umd2InterferometerConfig;
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum DeviceConfig {
     /// CiA 402 servo drive, on a CAN bus.
-    Cia402Drive(Cia402DriveConfig),
+    Cia402Drive(Box<Cia402DriveConfig>),
     /// CiA 401 analog inputs, on a CAN bus.
     Cia401Analog(Cia401AnalogConfig),
     /// CiA 404 measuring module, on a CAN bus.
@@ -72,7 +72,7 @@ pub(crate) trait Section {
 impl DeviceConfig {
     fn section(&self) -> &dyn Section {
         match self {
-            Self::Cia402Drive(section) => section,
+            Self::Cia402Drive(section) => &**section,
             Self::Cia401Analog(section) => section,
             Self::Cia404Analog(section) => section,
             Self::Umd2Interferometer(section) => section,
@@ -120,7 +120,7 @@ impl DeviceConfig {
 /// module.advance(module.next_event(), &mut plant);
 /// assert_eq!(module.poll_transmit(), Some(Payload::Bytes(b"!014117\r".to_vec())));
 /// ```
-pub trait Node: Any {
+pub trait Node: Any + Send {
     /// Whether what was sent on the node's port means anything to it; what does not changes nothing
     /// about the node, and is not handed to it.
     fn concerns(&self, _payload: &Payload) -> bool {

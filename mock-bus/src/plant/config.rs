@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 pub use self::parts::{
     ClimateConfig, DeviationConfig, EncoderConfig, HallConfig, InterferometerConfig, LimitConfig,
-    MotionConfig, StageConfig,
+    MotionConfig, StageConfig, WeightConfig,
 };
 
 use super::camera::CameraConfig;

@@ -33,6 +33,7 @@ pub use hall_field::{DriftLimits, HallDrift, SensorDrift};
 pub use instrument::{Beam, Fringes, Scanned};
 pub use parts::pulse::{IndexPulse, ProbeEdge};
 pub use parts::servo::Servo;
+pub use parts::travel::{Travel, Travelled};
 pub use picture::{BeamPlace, Mark, Scene};
 pub use platform::{PlatformTruth, Pose};
 pub use table::{Sight, TableTruth};
@@ -227,6 +228,14 @@ impl Plant {
         Some(Signal::Voltage(
             self.hall.volts(sensor, self.true_position()),
         ))
+    }
+
+    /// A judge begins to watch the motion of `axis`.
+    pub fn mark_travel(&mut self, axis: usize) {
+        let now = self.now;
+        if let Some(actuator) = self.machine.actuator_mut(axis) {
+            actuator.train_mut().mark(now);
+        }
     }
 
     /// The encoder of `axis` loses or gets power: its count starts again from 0.

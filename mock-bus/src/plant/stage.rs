@@ -36,6 +36,7 @@ impl Stage {
         let start_m = 1e-3 * shift.between(config.motion.start_min_mm, config.motion.start_max_mm);
         let mut stage = Self {
             train: DriveTrain {
+                travelled: start_m.into(),
                 mass: Mass::new(
                     config.motion.clone(),
                     start_m,

@@ -3,7 +3,7 @@
 use units::{Approach, Celsius, Metres};
 
 use super::stage::Stage;
-use super::{Environment, Plant};
+use super::{Environment, Plant, Travel};
 
 /// A look at the truth behind all sensors.
 ///
@@ -52,6 +52,12 @@ impl<'a> Truth<'a> {
         let Celsius(stage_c) = self.environment().stage_temperature;
         let scale_m = scale_position.value();
         Metres(self.stage().systematic_deviation_m(scale_m, sign, stage_c))
+    }
+
+    /// The true motion of `axis`; `None` where there is no such axis.
+    pub fn travel(&self, axis: usize) -> Option<Travel> {
+        let actuator = self.plant.machine.actuator(axis)?;
+        Some(actuator.train().travel(self.plant.now))
     }
 
     fn stage(&self) -> &Stage {

@@ -10,6 +10,7 @@ mod log;
 mod mains;
 mod port;
 mod traffic;
+mod travel;
 
 #[cfg(test)]
 mod linear_tests;

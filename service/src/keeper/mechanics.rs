@@ -6,7 +6,7 @@ use machine::{AxisSettings, Machine};
 use truestage::Failure;
 use truestage::linear::Course;
 use truestage::rotary::TableCourse;
-use units::{Approach, Metres, Time};
+use units::{Approach, Metres, Radians, Time};
 
 use crate::coordinate::Coordinate;
 
@@ -51,6 +51,16 @@ impl Mechanics {
         let turning = config.rotary.get(name);
         let turning = turning.map(|it| it.position_window_time_ms);
         Duration::from_millis(linear.or(turning).unwrap_or_default().into())
+    }
+
+    /// How near its target the axis `name` must be.
+    pub(super) fn position_window(machine: &truestage::Machine, name: &str) -> Coordinate {
+        let config = machine.config();
+        let turning = config.rotary.get(name);
+        let turning = turning.map(|table| Radians::from_arcsec(table.position_window_arcsec));
+        let linear = config.axis.get(name);
+        let linear = linear.map(|axis| Metres::from_um(axis.motion.position_window_um));
+        turning.map_or_else(|| linear.unwrap_or_default().into(), |window| window.into())
     }
 
     /// How long one move of the axis `name` may take.

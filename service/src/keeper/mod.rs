@@ -8,6 +8,7 @@ mod motion;
 mod orders;
 mod publish;
 mod question;
+mod rest;
 mod run;
 mod seat;
 mod setup;
@@ -242,6 +243,14 @@ impl Keeper {
         self.events.push("machine", "", json!({"cause": &*cause}));
         for seat in &mut self.seats {
             seat.last_cause = Some(Arc::clone(&cause));
+        }
+    }
+
+    /// What failed had a cause that showed while everything was stopped.
+    pub(crate) fn explain_fault(&mut self, failure: &truestage::Failure) {
+        let known = self.fault.as_deref().map(|cause| cause.cause.as_str());
+        if known != Some(cause_of(failure).cause.as_str()) {
+            self.begin_fault(failure);
         }
     }
 

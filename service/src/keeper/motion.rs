@@ -17,7 +17,7 @@ use truestage::linear::Corrected;
 use units::Time;
 
 use self::going::{Going, Wanted};
-use self::jog::HeldBack;
+use self::jog::{HeldBack, Replaced};
 use self::together::Together;
 use super::Keeper;
 use super::seat::{Seat, Task};
@@ -143,6 +143,8 @@ pub(super) struct Motions {
     about: Option<String>,
     /// Who has not let go of a jog that was ended.
     held_back: Vec<HeldBack>,
+    /// Jogs that gave way to others of their callers.
+    replaced: Vec<Replaced>,
     published: Option<Arc<Vec<Arc<MotionView>>>>,
 }
 

@@ -9,6 +9,7 @@ use units::Time;
 use wire::cia402::PowerState;
 
 use super::mechanics::Mechanics;
+use super::rest::RestWatch;
 use crate::coordinate::Coordinate;
 use crate::order::Reply;
 use crate::quantity::Quantity;
@@ -44,6 +45,8 @@ pub(crate) struct Seat {
     pub(super) move_timeout: Duration,
     /// How long it must have been in position.
     pub(super) in_position: Duration,
+    /// Whether it moves by its samples, whatever its drive says.
+    pub(super) rest: RestWatch,
     pub(super) calibration: Option<Arc<CalibrationInUse>>,
     pub(super) task: Task,
     pub(super) standing_since: Option<Time>,
@@ -87,6 +90,11 @@ impl Seat {
         let Some(sampled) = self.mechanics.sampled(machine, &self.name) else {
             return;
         };
+        match self.is_free() {
+            true => self.rest.note(sampled.at, sampled.position),
+            // What it moves for says how it is judged.
+            false => self.rest.forget(),
+        }
         match (sampled.standing, self.standing_since) {
             (false, _) => {
                 self.standing_since = None;
@@ -131,6 +139,9 @@ impl Seat {
             Task::Run(..) if power != Some(PowerState::OperationEnabled) => AxisState::Disabled,
             Task::Run(..) | Task::Motion(_) => AxisState::DiscreteMotion,
             Task::Free | Task::Power(_) => match power {
+                Some(PowerState::OperationEnabled) if self.rest.moves() => {
+                    AxisState::ContinuousMotion
+                }
                 Some(PowerState::OperationEnabled) => AxisState::Standstill,
                 Some(PowerState::Fault | PowerState::FaultReactionActive) => AxisState::ErrorStop,
                 _ => AxisState::Disabled,

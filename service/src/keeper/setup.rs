@@ -8,6 +8,7 @@ use truestage::{Failure, Machine};
 
 use super::events::utc_now;
 use super::mechanics::Mechanics;
+use super::rest::RestWatch;
 use super::seat::{self, Seat};
 use crate::problem::Problem;
 use crate::quantity::Quantity;
@@ -73,6 +74,7 @@ fn seat(machine: &mut Machine, groups: &[Group], name: &str) -> Result<Seat, Fai
         mechanics: Mechanics::of(machine, name)?,
         move_timeout: Mechanics::move_timeout(machine, name),
         in_position: Mechanics::in_position(machine, name),
+        rest: RestWatch::new(Mechanics::position_window(machine, name)),
         calibration: None,
         task: seat::Task::Free,
         standing_since: None,

@@ -52,7 +52,7 @@ fn gtc_comes_to_the_budget_of_a_zero_from_its_record_and_from_its_passes() {
     let passes = passes();
     let options = RefineOptions::default();
     let zero = refine_passes(&passes, &options).expect("they tell it");
-    let budget = zero_budget(&zero, COUNT).expect("its figures are finite");
+    let budget = zero_budget(&zero, COUNT, Metres::ZERO).expect("its figures are finite");
     let record = zero_budget_record(&budget, zero.origin);
     let origin = |it: &Pass| {
         let found = refine(&it.points, &options);

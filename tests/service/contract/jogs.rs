@@ -411,3 +411,108 @@ fn a_jog_that_was_ended_does_not_begin_again_until_its_key_is_let_go() {
         bed.lets_go();
     });
 }
+
+#[test]
+fn a_second_person_is_refused_while_the_first_one_jogs() {
+    with_zeroed_stage(|bed| {
+        bed.stage.gate.limit(OFTEN);
+        let id = bed.jogs(&jog(20.0));
+        let mut last = bed.encoder_mm("x");
+        for at in 0..60 {
+            assert_eq!(bed.jogs(&jog(20.0)), id, "it goes on");
+            for speed in [-20.0, 20.0, 5.0] {
+                let problem = bed.client.jog(&bert(), &jog(speed)).unwrap_err();
+                assert_eq!(problem.code, Code::AxisBusy, "{problem}");
+                let said = problem.to_string();
+                for word in ["jogged by anna", "20.000 mm/s", "since 20", &id] {
+                    assert!(said.contains(word), "{word}: {said}");
+                }
+            }
+            let here = bed.encoder_mm("x");
+            assert!(here >= last, "round {at}: {here} mm after {last} mm");
+            last = here;
+        }
+        assert!(last > 2.0, "{last} mm");
+        // Anybody may end it.
+        let ended = bed
+            .client
+            .jog(&bert(), &jog(0.0))
+            .expect("an end is never refused");
+        assert_eq!(ended, id);
+        assert_eq!(bed.ended(&id).stopped.expect("it was ended").by, "bert");
+        // Then the axis is free for whoever asks.
+        let back = bed
+            .client
+            .jog(&bert(), &jog(-20.0))
+            .expect("the axis is free");
+        assert_ne!(back, id);
+        bed.lets_go();
+        bed.ended(&back);
+    });
+}
+
+#[test]
+fn two_keys_under_one_name_stop_the_jog() {
+    with_zeroed_stage(|bed| {
+        let middle = bed.begin(&to("x", 20.0));
+        assert_eq!(bed.ended(&middle).state, MotionState::Done);
+        bed.stage.gate.limit(OFTEN);
+        let first = bed.jogs(&jog(20.0));
+        let second = bed.jogs(&jog(-20.0));
+        let conflict = bed.client.jog(&anna(), &jog(20.0)).unwrap_err();
+        assert_eq!(conflict.code, Code::AxisBusy, "{conflict}");
+        assert!(
+            conflict.to_string().contains("different speeds"),
+            "{conflict}"
+        );
+        // As long as both are held, nothing begins again.
+        let asks = |rounds: u32| {
+            for at in 0..rounds {
+                let speed = if at % 2 == 0 { -20.0 } else { 20.0 };
+                bed.client.jog(&anna(), &jog(speed)).unwrap_err();
+            }
+        };
+        asks(50);
+        let here = bed.encoder_mm("x");
+        asks(50);
+        let moved = bed.encoder_mm("x") - here;
+        assert!(moved.abs() < 1e-3, "{moved} mm");
+        for id in [&first, &second] {
+            assert_eq!(bed.now(id).state, MotionState::Stopped, "{id}");
+        }
+        bed.lets_go();
+        bed.let_time_pass(0.5);
+        let again = bed.jogs(&jog(-20.0));
+        assert_eq!(bed.ended(&again).state, MotionState::Stopped);
+    });
+}
+
+#[test]
+fn the_holder_of_the_lease_jogs_instead_of_others() {
+    with_zeroed_stage(|bed| {
+        let middle = bed.begin(&to("x", 20.0));
+        assert_eq!(bed.ended(&middle).state, MotionState::Done);
+        bed.stage.gate.limit(OFTEN);
+        let id = bed.jogs(&jog(5.0));
+        let lease = service::LeaseRequest {
+            name: "bert".into(),
+            seconds: 60,
+            force: false,
+        };
+        let leased = bed.client.lease(&bert(), &lease).expect("nobody has it");
+        let holder = service::Caller {
+            lease: Some(leased.token),
+            ..bert()
+        };
+        let next = bed
+            .client
+            .jog(&holder, &jog(-5.0))
+            .expect("the lease is his");
+        let refused = bed.client.jog(&anna(), &jog(5.0)).unwrap_err();
+        assert_eq!(refused.code, Code::Leased, "{refused}");
+        assert_eq!(bed.ended(&id).stopped.expect("it gave way").by, "bert");
+        bed.lets_go();
+        assert_eq!(bed.ended(&next).state, MotionState::Stopped);
+        bed.client.release(&holder).expect("it is his");
+    });
+}

@@ -349,7 +349,7 @@ fn motions_of_disjoint_axes_overlap() {
             uncompensated: false,
             ..of(&[("x", 2.0)])
         };
-        bed.refused(&refused, Code::NotOffered);
+        bed.refused(&refused, Code::Calibration);
         bed.refused(&compensated("x", 2.0), Code::Calibration);
         let corrected = path("0,1,1,1\n1,2,1,1\n");
         let problem = bed.client.plan(&anna(), &corrected).unwrap_err();

@@ -292,14 +292,19 @@ fn a_pose_that_takes_too_long_has_timed_out_and_what_is_queued_has_failed() {
 }
 
 /// Three axes whose errors are known, and what their detectors read.
-fn with_known_volume(body: impl Fn(&Bed<'_>)) {
+pub(super) fn with_known_volume(body: impl Fn(&Bed<'_>)) {
+    with_known_volume_of(quick, body);
+}
+
+/// The same after `change` of its configuration.
+pub(super) fn with_known_volume_of(change: fn(String) -> String, body: impl Fn(&Bed<'_>)) {
     let mut before = Volume::zeroed(SEED, quick, |text| text);
     before.know_errors();
     let store = before.bench.store.clone();
     good(before.work().reference(&store));
     let new = |rig, folder: &Path| {
         before.bequeath(&folder.join("volumetric"));
-        Stage::new(rig, (VOLUMETRIC, SEED), folder, quick)
+        Stage::new(rig, (VOLUMETRIC, SEED), folder, change)
     };
     each_here(new, zeroed(body));
 }

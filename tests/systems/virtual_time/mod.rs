@@ -3,6 +3,7 @@
 
 mod certified;
 mod gantry;
+mod histories;
 mod job;
 mod kept_reference;
 mod kept_reference_history;

@@ -258,8 +258,8 @@ fn a_position_that_is_wrong_in_every_run_is_refused_and_named() {
         for part in [
             "axis x: ",
             "at 36.000 mm",
-            "jump_limit_um = ",
-            "wise only when",
+            "Look for a knock",
+            "measure again",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }

@@ -87,6 +87,11 @@ impl EmergencyCode {
         NAMES.iter().map(|(_, value, _)| Self(*value))
     }
 
+    /// Whether the standards have a class for it.
+    pub fn has_class(self) -> bool {
+        !self.is_cleared() && NAMES.iter().any(|(mask, value, _)| self.0 & mask == *value)
+    }
+
     /// What the standards call it.
     pub fn name(self) -> &'static str {
         NAMES

@@ -3,6 +3,7 @@
 use units::{Approach, Metres, Volts};
 
 use super::Sensor;
+use crate::hall_zero::Jump;
 use crate::least_squares::LeastSquaresError;
 
 /// Which flank.
@@ -102,6 +103,15 @@ pub enum RefineError {
         /// The limit.
         limit: f64,
     },
+    /// A voltage jumped during the passes.
+    #[error("hall refinement: {0}")]
+    Jumped(Jump),
+    /// The slope sensor goes the other way than in the search.
+    #[error(
+        "hall refinement: the slope sensor looks inverted in polarity: in the passes it goes the other way than in \
+             the search; check its wiring"
+    )]
+    SlopeInverted,
     /// The curves are each other's.
     #[error("hall refinement: curve 1 is odd and curve 2 even around {} mm; the sensors (or the \
              columns of the file) look swapped", units::Short(around.mm()))]

@@ -6,8 +6,8 @@ use units::{Metres, MetresPerSecond, Volts};
 
 use super::{Held, Sample};
 use crate::hall_zero::{
-    HallPoint, Pass, RefineError, RefineOptions, SearchFailure, Settings, ZeroEstimate, refine,
-    refine_passes,
+    HallPoint, Pass, RefineError, RefineOptions, SearchFailure, Settings, ZeroEstimate, jump,
+    refine, refine_passes,
 };
 
 /// A zero found by the patent's steps.
@@ -45,7 +45,8 @@ impl Outcome {
     /// The regression over passes that were made after the search; see [`refine_passes`].
     ///
     /// # Errors
-    /// As [`refine_passes`]; and when it lies further from P0 than the bands δ2 and δ3 and the lost motion
+    /// As [`refine_passes`], or the jump of a voltage between two samples that spoilt it; when the slope sensor is the
+    /// wrong way round in them; and when it lies further from P0 than the bands δ2 and δ3 and the lost motion
     /// explain.
     pub fn refine_by_passes(
         &self,
@@ -53,7 +54,16 @@ impl Outcome {
         settings: &Settings,
     ) -> Result<ZeroEstimate, RefineError> {
         let options = RefineOptions::for_search(settings);
-        self.agreed(refine_passes(passes, &options)?, settings)
+        let refined = refine_passes(passes, &options);
+        let estimate = refined.map_err(|error| {
+            let each = passes.iter().flat_map(|pass| pass.points.iter().copied());
+            let points: Vec<HallPoint> = each.collect();
+            jump::find(&points, settings).map_or(error, RefineError::Jumped)
+        })?;
+        if (estimate.centre_slope_v_per_m > 0.0) != settings.slope_rising {
+            return Err(RefineError::SlopeInverted);
+        }
+        self.agreed(estimate, settings)
     }
 
     /// How fast the flanks that were found may be passed when a sample is taken every `sampling`.

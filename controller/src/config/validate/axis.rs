@@ -7,6 +7,7 @@ use units::Short;
 use crate::config::judge::{Finding, Judge};
 use crate::config::{AxisConfig, MachineConfig};
 use crate::hardware::bus::SerialLine;
+use crate::hardware::drive::DriveConfig;
 use crate::hardware::drive::copley::AMPLIFIER_RATES;
 
 pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &AxisConfig) {
@@ -29,6 +30,11 @@ pub(super) fn check_axis(judge: &mut Judge<'_>, config: &MachineConfig, axis: &A
         );
     }
     check_following_error(judge, axis);
+    if let Some(limit) = motion.hold_limit_um {
+        let window = ("position_window_um", motion.position_window_um);
+        judge.at_least("hold_limit_um", limit, window);
+    }
+    check_gravity(judge, axis);
     check_drive_units(judge, axis);
 }
 
@@ -47,6 +53,32 @@ fn check_following_error(judge: &mut Judge<'_>, axis: &AxisConfig) {
             "give what a move may lag behind, hundreds of counts or more",
         );
     }
+}
+
+/// A drive that is switched off after a quick stop lets its axis fall.
+fn check_gravity(judge: &mut Judge<'_>, axis: &AxisConfig) {
+    let motion = &axis.motion;
+    if !motion.gravity || motion.drive_brake {
+        return;
+    }
+    let seen = match &axis.drive {
+        DriveConfig::Cia402(drive) => match drive.option_codes.quick_stop {
+            Some(5..=8) => return,
+            Some(code) => format!("with the quick stop code {code} its drive lets go of it"),
+            None => "what its drive does after a quick stop is not stated".to_owned(),
+        },
+        DriveConfig::Copley(_) => "an amplifier that is switched off lets go of it".to_owned(),
+    };
+    let help = match &axis.drive {
+        DriveConfig::Cia402(_) => {
+            "set `option_codes = { quick_stop = 6 }` (or 5, 7, 8), so that the drive holds the axis, or \
+             `drive_brake = true` where the drive closes a brake of its own first"
+        }
+        DriveConfig::Copley(_) => {
+            "set `drive_brake = true` where the amplifier closes a brake before it switches off"
+        }
+    };
+    judge.say("gravity", format!("is true, and {seen}"), help);
 }
 
 /// Drives hold speeds and accelerations in 32 bits, in units of their counts.
@@ -272,6 +304,38 @@ mod tests {
             let says = "0.002 µm are less than one count of 0.01 µm";
             check(text, from, to, key, says);
         }
+    }
+
+    #[test]
+    fn an_axis_that_gravity_pulls_is_never_let_go() {
+        let (from, key) = ("following_error_limit_um = 200.0", "axis.u.gravity");
+        let gravity = "gravity = true\nfollowing_error_limit_um = 200.0";
+        check(
+            DRIVES,
+            from,
+            gravity,
+            key,
+            "after a quick stop is not stated",
+        );
+        let ramp =
+            "gravity = true\noption_codes = { quick_stop = 2 }\nfollowing_error_limit_um = 200.0";
+        check(DRIVES, from, ramp, key, "with the quick stop code 2");
+        let amplifier = "an amplifier that is switched off lets go of it";
+        check(AMPLIFIERS, from, gravity, key, amplifier);
+        let hold =
+            "gravity = true\noption_codes = { quick_stop = 6 }\nfollowing_error_limit_um = 200.0";
+        let brake = "gravity = true\ndrive_brake = true\nfollowing_error_limit_um = 200.0";
+        for (text, to) in [(DRIVES, hold), (DRIVES, brake), (AMPLIFIERS, brake)] {
+            let parsed = crate::config::parse(&text.replacen(from, to, 1), "m.toml");
+            assert!(parsed.is_ok(), "{to}");
+        }
+    }
+
+    #[test]
+    fn a_hold_limit_below_the_window_is_refused() {
+        let (from, key) = ("following_error_limit_um = 200.0", "axis.u.hold_limit_um");
+        let to = "hold_limit_um = 0.01\nfollowing_error_limit_um = 200.0";
+        check(DRIVES, from, to, key, "position_window_um");
     }
 
     #[test]

@@ -98,6 +98,8 @@ impl Cia402AxisConfig {
             )),
             position_window: Metres::from_um(motion.position_window_um),
             position_window_time: millis(motion.position_window_time_ms),
+            hold_limit: Some(motion.hold_limit()),
+            gravity: motion.gravity,
             quick_stop_deceleration: Some(quick_stop),
             stall_max: patience.beyond(usual.common.sync_period),
             home_offset: home_offset(self.home_offset),

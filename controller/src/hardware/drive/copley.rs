@@ -78,6 +78,8 @@ impl CopleyAxisConfig {
             following_error: Some(Metres::from_um(motion.following_error_limit_um)),
             position_window: Metres::from_um(motion.position_window_um),
             position_window_time: millis(motion.position_window_time_ms),
+            hold_limit: Some(motion.hold_limit()),
+            gravity: motion.gravity,
             quick_stop_deceleration: quick_stop,
             poll_period: Duration::from_secs_f64(self.poll_period_ms * 1e-3),
             timeouts: patient(

@@ -103,7 +103,7 @@ pub struct MotionConfig {
     /// Likewise (0xb9).
     #[schemars(extend("x-own" = true))]
     pub soft_max_mm: f64,
-    /// Speed of ordinary moves.
+    /// Greatest speed of every motion that is no path and has no speed of its own in this file.
     #[schemars(range(min = 0.001), extend("x-range" = "at most `speed_max_mm_per_s`"))]
     #[schemars(extend("x-own" = true))]
     pub speed_mm_per_s: f64,
@@ -122,6 +122,17 @@ pub struct MotionConfig {
     /// Following error window (0x6065; 0xba).
     #[schemars(range(min = 0.001, max = 100000.0), extend("x-range" = "at least one count"))]
     pub following_error_limit_um: f64,
+    /// How far an axis that is on, and that nothing moves, may be from where it stood before it is stopped; a tenth of
+    /// `following_error_limit_um` when left out, and `position_window_um` at least.
+    #[schemars(range(min = 0.0001, max = 100000.0), extend("x-range" = "at least `position_window_um`"))]
+    pub hold_limit_um: Option<f64>,
+    /// Gravity pulls the axis: it is never let go. Its drive stays in quick stop active (`option_codes`, `quick_stop` 5 to
+    /// 8), or holds it by a brake of its own (`drive_brake`).
+    #[serde(default)]
+    pub gravity: bool,
+    /// The drive closes a holding brake by itself before it switches its power off.
+    #[serde(default)]
+    pub drive_brake: bool,
     /// How near its target the axis must be (0x6067; 0xbc).
     #[schemars(range(min = 0.0001, max = 10000.0))]
     pub position_window_um: f64,
@@ -138,8 +149,8 @@ pub struct MotionConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CyclicConfig {
-    /// Greatest jerk of paths, moves and controlled stops; speed and acceleration are limited to
-    /// `speed_max_mm_per_s` and `acceleration_mm_per_s2`.
+    /// Greatest jerk of paths, moves and controlled stops. A path is limited to `speed_max_mm_per_s`, a move and the way
+    /// to the first point of a path to `speed_mm_per_s`, all of them to `acceleration_mm_per_s2`.
     #[schemars(range(min = 1.0, max = 1000000000.0))]
     pub jerk_mm_per_s3: f64,
     /// This far outside its last set-points, twice running, the axis counts as blocked or astray.
@@ -157,11 +168,21 @@ pub struct CyclicConfig {
 }
 
 impl MotionConfig {
+    /// How far it may be from where it stood while nothing moves it.
+    pub(crate) fn hold_limit(&self) -> Metres {
+        let usual_um = HOLD_SHARE * self.following_error_limit_um;
+        let limit_um = self.hold_limit_um.unwrap_or(usual_um);
+        Metres::from_um(limit_um.max(self.position_window_um))
+    }
+
     /// Whether the soft limits leave any travel: where they are swapped, that is told and nothing else by them.
     pub(crate) fn has_travel(&self) -> bool {
         self.soft_min_mm < self.soft_max_mm
     }
 }
+
+/// An axis that stands may be this share of its following error limit from where it stood.
+pub(crate) const HOLD_SHARE: f64 = 0.1;
 
 /// The share of a drive's speed that is left to catch up what a SYNC that came early left short.
 const CATCHING_UP: f64 = 0.02;
@@ -187,6 +208,7 @@ pub(crate) fn cyclic_settings(
         min: Metres::from_mm(axis.soft_min_mm),
         max: Metres::from_mm(axis.soft_max_mm),
         speed: path_speed(axis, cyclic),
+        move_speed: MetresPerSecond(axis.speed_mm_per_s * 1e-3).min(path_speed(axis, cyclic)),
         acceleration: MetresPerSecondSquared(axis.acceleration_mm_per_s2 * 1e-3),
         jerk: MetresPerSecondCubed(cyclic.jerk_mm_per_s3 * 1e-3),
         deviation: Metres::from_um(cyclic.deviation_limit_um),

@@ -4,11 +4,13 @@
 mod aborts;
 mod emergencies;
 mod exits;
+mod states;
 
 use clap::Args;
 use serde_json::{Value, json};
 use wire::canopen::emcy::EmergencyCode;
 use wire::canopen::sdo::AbortCode;
+use wire::cia402::{NamedStatus, PowerState, Statusword};
 
 use crate::Failure;
 use crate::program::output::{Ended, Output};
@@ -17,7 +19,7 @@ use crate::program::output::{Ended, Output};
 #[derive(Debug, Args)]
 pub(crate) struct ExplainArgs {
     /// `0x06090030`: an SDO abort code; `0x8611`: the code of an emergency message, or a drive's own (object 0x603F);
-    /// `4`: an exit code of this program.
+    /// `0x0637`: a drive's statusword (object 0x6041); `4`: an exit code of this program.
     #[arg(value_name = "CODE", required = true)]
     codes: Vec<String>,
 }
@@ -44,8 +46,8 @@ struct Explained {
 /// # Errors
 /// When one of them is no code.
 pub(crate) fn run(args: &ExplainArgs, output: Output) -> Ended {
-    let each = args.codes.iter().map(|it| explained(it));
-    let each = each.collect::<Result<Vec<_>, _>>()?;
+    let each = args.codes.iter().map(|code| explained(code));
+    let each = each.collect::<Result<Vec<_>, _>>()?.concat();
     let texts: Vec<String> = each.iter().map(text).collect();
     let values: Vec<Value> = each.iter().map(value).collect();
     output.result(&texts.join("\n\n"), &json!({ "codes": values }))
@@ -68,30 +70,60 @@ fn value(it: &Explained) -> Value {
     })
 }
 
-/// By its form: eight digits behind `0x` are an SDO abort code, four an emergency code, a decimal number an exit code.
-fn explained(word: &str) -> Result<Explained, Failure> {
+/// By its form: eight digits behind `0x` are an SDO abort code, four an emergency code or a statusword, a decimal number
+/// an exit code.
+fn explained(word: &str) -> Result<Vec<Explained>, Failure> {
     let unknown = || {
         let exits = exits::CODES.iter().map(u8::to_string);
         let exits: Vec<String> = exits.collect();
         Failure::Usage {
             what: format!("`{word}` is no code"),
             help: format!(
-                "write an SDO abort code as 0x06090030, an emergency code or a drive's as 0x8611, an exit code of this \
-                 program as one of {}",
+                "write an SDO abort code as 0x06090030, an emergency code or a drive's as 0x8611, a statusword as 0x0637, \
+                 an exit code of this program as one of {}",
                 exits.join(", ")
             ),
         }
     };
     let Some(digits) = word.strip_prefix("0x").or(word.strip_prefix("0X")) else {
         let exit = word.parse().ok().and_then(exit);
-        return exit.or_else(|| named(word)).ok_or_else(unknown);
+        let known = exit.or_else(|| named(word)).ok_or_else(unknown)?;
+        return Ok(vec![known]);
     };
     let digits = digits.replace('_', "");
     let raw = u32::from_str_radix(&digits, 16).map_err(|_| unknown())?;
     match (digits.len(), u16::try_from(raw)) {
-        (..=4, Ok(code)) => Ok(emergency(EmergencyCode(code))),
-        (5..=8, _) => Ok(abort(AbortCode::from_raw(raw))),
+        (..=4, Ok(code)) => Ok(of_four_digits(code)),
+        (5..=8, _) => Ok(vec![abort(AbortCode::from_raw(raw))]),
         _ => Err(unknown()),
+    }
+}
+
+/// An emergency code where the standards name that very code; a statusword where they name no such class; else both, as
+/// far as it is a state.
+fn of_four_digits(code: u16) -> Vec<Explained> {
+    let (code, word) = (EmergencyCode(code), Statusword::from_bits_retain(code));
+    let state = match word.state() {
+        // Many codes of devices look like these.
+        PowerState::NotReadyToSwitchOn | PowerState::Unknown(_) => None,
+        state => Some(status(word, state)),
+    };
+    if EmergencyCode::named().any(|named| named == code) {
+        return vec![emergency(code)];
+    }
+    match state {
+        Some(status) if !code.has_class() => vec![status],
+        state => [emergency(code)].into_iter().chain(state).collect(),
+    }
+}
+
+fn status(word: Statusword, state: PowerState) -> Explained {
+    Explained {
+        kind: "statusword",
+        meaning: NamedStatus::new(word, None)
+            .to_string()
+            .replacen("statusword ", "", 1),
+        advice: states::of(state),
     }
 }
 
@@ -142,7 +174,10 @@ mod tests {
 
     #[test]
     fn a_code_is_known_by_its_form() {
-        let kind = |word: &str| explained(word).map(|it| (it.kind, it.meaning));
+        let kind = |word: &str| {
+            let first = explained(word)?.swap_remove(0);
+            Ok::<_, Failure>((first.kind, first.meaning))
+        };
         let (abort, emergency, exit) = (
             "SDO abort code",
             "emergency or drive fault code",
@@ -155,6 +190,8 @@ mod tests {
             ("8611", emergency, "following error"),
             ("06090030", abort, "value out of range"),
             ("0x2311", emergency, "current"),
+            ("0x0637", "statusword", "operation enabled; target reached"),
+            ("0x0240", "statusword", "voltage off: mains, STO"),
             ("4", exit, "device or bus"),
             ("130", exit, "Ctrl-C"),
         ] {
@@ -176,6 +213,27 @@ mod tests {
         ] {
             let told = kind(word).expect_err(word).to_string();
             assert!(told.contains("is no code"), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_word_that_may_be_both_is_explained_as_both() {
+        let kinds = |word: &str| {
+            let each = explained(word).expect("a code");
+            each.iter().map(|code| code.kind).collect::<Vec<_>>()
+        };
+        let emergency = "emergency or drive fault code";
+        assert_eq!(kinds("0x1637"), ["statusword"]);
+        assert_eq!(kinds("0x2637"), [emergency, "statusword"]);
+        assert_eq!(kinds("0x8611"), [emergency]);
+        assert_eq!(kinds("0x0250"), ["statusword"]);
+    }
+
+    #[test]
+    fn every_state_has_advice_of_its_own() {
+        for raw in [0x40, 0x21, 0x23, 0x27, 0x07, 0x0F, 0x08] {
+            let state = Statusword::from_bits_retain(raw).state();
+            check(states::of(state), &state.to_string());
         }
     }
 

@@ -63,9 +63,7 @@ fn never_drifted(accept_drift: bool) -> Result<(), Failure> {
     }
     Err(Failure::Usage {
         what: "a platform that has drifted cannot be calibrated".into(),
-        help: "leave --accept-drift out; wait until the temperature has settled, or raise \
-               closure_limit_um"
-            .into(),
+        help: "leave --accept-drift out; wait until the temperature has settled".into(),
     })
 }
 

@@ -21,6 +21,7 @@ use wire::canopen::emcy::Emergency;
 use wire::canopen::nmt::{NmtCommand, NmtState, consumer_heartbeat_entry};
 use wire::canopen::{Function, NodeId, Object};
 
+pub(super) use settings::millis;
 pub use settings::{ExpectedIdentity, NodeSettings, NodeTimeouts};
 
 use super::{Alarm, DeviceError, DeviceName, Identity, Seen};
@@ -96,6 +97,8 @@ pub(super) struct CanopenNode {
     identity: Option<Identity>,
     last_pdo: Time,
     pdo_silent: bool,
+    /// The node confirmed that it watches our heartbeat.
+    watches_master: bool,
     emergencies: u64,
     heartbeats_lost: u64,
     boot_ups: u64,
@@ -119,6 +122,7 @@ impl CanopenNode {
             identity: None,
             last_pdo: Time::ZERO,
             pdo_silent: false,
+            watches_master: false,
             emergencies: 0,
             heartbeats_lost: 0,
             boot_ups: 0,
@@ -181,6 +185,7 @@ impl CanopenNode {
         self.events.clear();
         self.identity = None;
         self.pdo_silent = false;
+        self.watches_master = false;
         self.consumer.rest();
         self.twins.forget();
         self.description = description;
@@ -202,7 +207,7 @@ impl CanopenNode {
             "setting the node's heartbeat",
         ));
         steps.push(Step::check(
-            Object::new(0x1016, 1),
+            vigil::WATCH,
             watch,
             "making the node watch our heartbeat",
         ));
@@ -416,6 +421,7 @@ impl CanopenNode {
                 }
             }
             Phase::Configuring => {
+                self.watches_master = !self.settings.master_consumer_time.is_zero();
                 // What was reported before NMT start says nothing about what follows it.
                 self.consumer.forget();
                 self.consumer.expect(now);
@@ -491,9 +497,4 @@ impl CanopenNode {
         self.consumer.rest();
         self.events.push_back(NodeEvent::Failed(error));
     }
-}
-
-/// Whole milliseconds, as 0x1016 and 0x1017 hold them.
-pub(super) fn millis(span: Duration) -> u16 {
-    u16::try_from(span.as_millis()).unwrap_or(u16::MAX)
 }

@@ -108,3 +108,8 @@ impl NodeSettings {
         }
     }
 }
+
+/// Whole milliseconds, as 0x1016 and 0x1017 hold them.
+pub(in crate::device) fn millis(span: Duration) -> u16 {
+    u16::try_from(span.as_millis()).unwrap_or(u16::MAX)
+}

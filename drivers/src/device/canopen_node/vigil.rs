@@ -1,14 +1,35 @@
 //! What a node says unasked: heartbeats, boot-ups, emergencies.
 
 use units::Time;
+use wire::canopen::Object;
 use wire::canopen::emcy::Emergency;
 use wire::canopen::nmt::NmtState;
 
 use super::{CanopenNode, NodeEvent, Phase};
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::heartbeat::HeartbeatEvent;
+use crate::protocol::script::Step;
+
+/// The first entry of the heartbeats that a node watches.
+pub(super) const WATCH: Object = Object::new(0x1016, 1);
 
 impl CanopenNode {
+    /// Whether its watch on our heartbeat was written and read back since the start, and it has not booted since.
+    pub(in crate::device) const fn watches_master(&self) -> bool {
+        self.watches_master
+    }
+
+    /// Ends that watch: without our heartbeat the node would fault. `false`: it watches none.
+    pub(in crate::device) fn release_watch(&mut self, now: Time) -> bool {
+        if !self.watches_master {
+            return false;
+        }
+        let text = "ending its watch on our heartbeat";
+        self.watches_master = false;
+        self.run(now, vec![Step::check(WATCH, 0_u32, text)]);
+        true
+    }
+
     pub(super) fn take_heartbeat(&mut self, now: Time, event: HeartbeatEvent) {
         match event {
             HeartbeatEvent::BootUp => self.take_boot_up(now),
@@ -30,6 +51,7 @@ impl CanopenNode {
 
     fn take_boot_up(&mut self, now: Time) {
         self.boot_ups += 1;
+        self.watches_master = false;
         // Nothing older than the boot-up can come any more.
         self.client.server_restarted();
         self.script = None;

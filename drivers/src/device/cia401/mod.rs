@@ -229,6 +229,10 @@ impl Device for Cia401Analog {
         self.module.start(now);
     }
 
+    fn release_watch(&mut self, now: Time) -> bool {
+        self.module.node.release_watch(now)
+    }
+
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
         self.module.outcome.take()
     }

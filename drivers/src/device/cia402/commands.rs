@@ -18,6 +18,14 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         );
     }
 
+    /// Whether a motion is under way that a superseding command does not end.
+    const fn is_moving(&self) -> bool {
+        matches!(
+            self.activity,
+            Activity::Move(_) | Activity::Homing(_) | Activity::Halt(_)
+        )
+    }
+
     fn is_enabled(&self) -> bool {
         self.state() == Some(PowerState::OperationEnabled)
     }
@@ -25,11 +33,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
 impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
     fn control(&mut self, now: Time, command: DriveCommand) {
+        let was_moving = self.is_moving();
         self.supersede(now);
         match command {
             DriveCommand::QuickStop => self.begin_quick_stop(now),
             _ if !self.node.is_in_service() => self.refuse_out_of_service(),
-            DriveCommand::Enable => self.begin_enable(now),
+            DriveCommand::Enable => self.begin_enable(now, was_moving),
             DriveCommand::Disable => self.begin_disable(now),
             DriveCommand::ResetFault => self.begin_reset(now),
             // A drive that is not enabled does not move: nothing is left to do.
@@ -47,6 +56,14 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
 
     fn is_homed(&self) -> bool {
         self.homed
+    }
+
+    fn watches_master(&self) -> bool {
+        self.node.watches_master()
+    }
+
+    fn was_enabled(&self) -> bool {
+        self.was_enabled
     }
 
     fn proves_reference(&self) -> bool {
@@ -72,10 +89,21 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             self.control(now, command);
             return;
         }
-        let prepared = self.prepared.take();
+        let (prepared, was_moving) = (self.prepared.take(), self.is_moving());
+        let is_motion = matches!(
+            command,
+            AxisCommand::MoveTo { .. } | AxisCommand::Prepare { .. } | AxisCommand::Start
+        );
         self.supersede(now);
+        if was_moving && !is_motion && self.is_enabled() {
+            // A motion under way may be replaced by another one only.
+            self.hold_back(now);
+        }
         match command {
             AxisCommand::Drive(_) => {}
+            _ if was_moving && !is_motion => {
+                self.refuse("homing", "an axis that stands still");
+            }
             _ if !self.node.is_in_service() => self.refuse_out_of_service(),
             _ if !self.is_enabled() => self.refuse("moving", "an enabled drive"),
             AxisCommand::MoveTo {
@@ -125,6 +153,7 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
             OperationMode::CyclicSynchronousPosition => self.image.plausible.stands(),
             _ => sample.status.contains(Statusword::TARGET_REACHED),
         };
+        let in_place = self.envelope.is_in_place(sample.position.0);
         let pending = sample.mode == OperationMode::ProfilePosition
             && sample.status.contains(Statusword::MODE_12);
         Some(AxisReading {
@@ -137,8 +166,9 @@ impl<Q: Coordinate> Axis<Q> for Cia402Drive<Q> {
                 .map(|counts| scale.to_coordinate(counts)),
             standing: reached
                 && !pending
+                && in_place
                 && !matches!(self.activity, Activity::Move(_) | Activity::Homing(_)),
-            at_rest: self.image.plausible.stands(),
+            at_rest: in_place && self.image.plausible.stands(),
         })
     }
 }

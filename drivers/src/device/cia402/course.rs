@@ -29,6 +29,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             | Activity::Halt(_)
             | Activity::Latch(_)
             | Activity::Mode(_)
+            | Activity::Release
             | Activity::Reference { .. } => {
                 self.course = None;
                 return;

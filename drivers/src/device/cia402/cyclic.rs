@@ -125,12 +125,28 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         self.mode() == cyclic && self.commanded_mode == cyclic
     }
 
-    /// A drive that is not enabled moves freely: its target goes with it.
+    /// Outside of a motion the target in RPDO 1 is the axis' own place: a frame that is taken for a
+    /// new set-point moves nothing.
     pub(super) fn keep_target_at_axis(&mut self) {
-        if let Some(sample) = self.image.sample()
-            && sample.state() != PowerState::OperationEnabled
-            && self.commanded_mode == Some(OperationMode::CyclicSynchronousPosition)
-        {
+        let Some(sample) = self.image.sample() else {
+            return;
+        };
+        let enabled = sample.state() == PowerState::OperationEnabled;
+        let cyclic = Some(OperationMode::CyclicSynchronousPosition);
+        let follows = self.commanded_mode == cyclic || Some(sample.mode) == cyclic;
+        let has_target = match &self.activity {
+            Activity::Move(moving) => moving.has_announced(),
+            Activity::Halt(halt) => halt.has_announced(),
+            Activity::Mode(_) => true,
+            Activity::Idle
+            | Activity::Starting
+            | Activity::Power(_)
+            | Activity::Homing(_)
+            | Activity::Latch(_)
+            | Activity::Release
+            | Activity::Reference { .. } => self.prepared.is_some(),
+        };
+        if !(enabled && (follows || has_target)) {
             self.target = sample.shown;
         }
     }
@@ -179,6 +195,11 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     pub(super) fn end_cyclic(&mut self, now: Time) {
         self.reached = None;
+        if self.open_target {
+            // Back in profile position the drive would go on to the target before.
+            self.send_control(now, self.control | Controlword::HALT);
+            self.repeat_at = Time::NEVER;
+        }
         self.write_mode(now, OperationMode::ProfilePosition, Vec::new());
     }
 
@@ -216,6 +237,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return;
         };
         if change.written && self.mode() == Some(change.to) {
+            match change.to {
+                OperationMode::CyclicSynchronousPosition => self.watch_set_points(),
+                _ => self.envelope.settle(),
+            }
             self.finish(Ok(()));
         }
     }
@@ -250,7 +275,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let range = settings.soft_limits.unwrap_or((target, target));
         let limit = if target < range.0 { range.0 } else { range.1 };
         match wire {
-            Some(wire) if range.0 <= target && target <= range.1 => self.target = wire,
+            Some(wire) if range.0 <= target && target <= range.1 => {
+                self.target = wire;
+                self.envelope.follow(now, counts);
+            }
             _ => {
                 let range = (target.value(), limit.value());
                 return Err(out_of_range(settings, object, "set-point", range, Q::UNIT));

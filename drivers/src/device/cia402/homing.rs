@@ -2,8 +2,8 @@
 //! mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Approach, Coordinate, Time};
-use wire::cia402::{Controlword, HomingStatus, OperationMode};
+use units::{Approach, Coordinate, Counts, Quantity, Time};
+use wire::cia402::{Controlword, HomingStatus, OperationMode, Statusword};
 
 use super::convert::{counts_i32, position_counts};
 use super::modulo::apart;
@@ -11,11 +11,14 @@ use super::reference::before_home;
 use super::settings::HomeOffset;
 use super::start::{HOME_OFFSET, MODE, homing_steps};
 use super::{Activity, Cia402Drive};
+use crate::device::envelope::{Profile, TRAVEL_MARGIN};
 use crate::device::{DeviceError, Seen};
 use crate::protocol::script::Step;
 
-/// So many samples after the start, "done" and "error" may still be those of the homing before.
+/// So many samples after the start, an error may still be that of the homing before.
 const STALE_SAMPLES: u8 = 5;
+/// A search for an index mark may go so much farther than a turn.
+const TURN_MARGIN: f64 = 1.1;
 
 #[derive(Clone, Debug, PartialEq)]
 enum Phase {
@@ -24,8 +27,12 @@ enum Phase {
     AwaitingHoming,
     Running {
         samples: u8,
-        /// "In progress" or the like was seen: what follows is about this homing.
+        /// "Attained" was seen low since the start: what follows is about this homing.
         begun: bool,
+        /// Before the start, the place shown was not the home coordinate.
+        was_far: bool,
+        /// Since when the axis stands and the drive calls homing done.
+        done_since: Option<Time>,
     },
     /// SDO: mode 1; then the outcome is told.
     Restoring(Result<(), DeviceError>),
@@ -39,8 +46,10 @@ pub(super) struct Homing {
     phase: Phase,
     /// The coordinate at home, in counts.
     position: i64,
-    /// Homed where it stands: the reading must become `position`.
-    here: bool,
+    /// How far from there the axis may stand afterwards.
+    beside: i64,
+    /// The search, in counts per second and per second squared; `None`: homed where it stands.
+    search: Option<Profile>,
     since: Time,
     deadline: Time,
 }
@@ -106,11 +115,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             let mut steps = homing_steps(&self.settings, method, offset, search)?;
             let first = before_home(&self.settings).filter(|_| search.is_none());
             steps.splice(0..0, first);
-            Ok((counts, steps))
+            Ok((
+                counts,
+                search.map(|speed| self.search_profile(speed)),
+                steps,
+            ))
         });
         match plan {
             Err(error) => self.finish(Err(error)),
-            Ok((position, steps)) => {
+            Ok((position, search, steps)) => {
                 self.reached = None;
                 self.homed = false;
                 self.before_home = None;
@@ -118,7 +131,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,
                     position,
-                    here: search.is_none(),
+                    beside: self.beside_home(search),
+                    search,
                     since: now,
                     deadline: Time::NEVER,
                 });
@@ -188,8 +202,33 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
+    /// The drive calls homing done, and shows another place.
+    fn refuse_home(&mut self) {
+        let (Activity::Homing(homing), Some(here)) = (&self.activity, self.image.here()) else {
+            return;
+        };
+        let shown = |counts| self.settings.scale.to_coordinate(Counts(counts)).into();
+        let error = DeviceError::NotAtHome {
+            node: self.node.id(),
+            shown: shown(here.position),
+            home: shown(homing.position),
+        };
+        self.envelope.settle();
+        self.finish(Err(error));
+    }
+
     fn restore(&mut self, now: Time, result: Result<(), DeviceError>) {
-        self.send_control(now, Controlword::ENABLE_COMMAND);
+        if result.is_err()
+            && let Some(here) = self.image.here()
+        {
+            self.envelope.begin_stop(here);
+        }
+        // In profile position a halted drive would go on to its target before.
+        let held = match self.open_target {
+            true => Controlword::HALT,
+            false => Controlword::empty(),
+        };
+        self.send_control(now, Controlword::ENABLE_COMMAND | held);
         self.repeat_at = Time::NEVER;
         self.enter_homing(now, Phase::Restoring(result), None);
         let mode = OperationMode::ProfilePosition.raw();
@@ -209,37 +248,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Phase::Preparing | Phase::Restoring(_) => {}
             Phase::AwaitingHoming => {
                 if sample.mode == OperationMode::Homing {
-                    let phase = Phase::Running {
-                        samples: 0,
-                        begun: false,
-                    };
-                    self.enter_homing(now, phase, Some(self.settings.timeouts.homing));
-                    self.send_control(now, Controlword::ENABLE_COMMAND | Controlword::MODE_4);
+                    self.start_homing(now);
                 }
             }
-            Phase::Running { samples, begun } => {
-                *samples = samples.saturating_add(1);
-                let status = HomingStatus::of(sample.status);
-                let fresh = *begun || *samples > STALE_SAMPLES;
-                match status {
-                    HomingStatus::InProgress | HomingStatus::Attained => {
-                        *begun = true;
-                        self.repeat_at = Time::NEVER;
-                    }
-                    HomingStatus::Done if fresh => self.restore(now, Ok(())),
-                    HomingStatus::ErrorMoving | HomingStatus::ErrorStopped if fresh => {
-                        let node = self.node.id();
-                        let (step, state) = ("homing", sample.state());
-                        let error = DeviceError::DriveRefused { node, step, state };
-                        self.restore(now, Err(error));
-                    }
-                    HomingStatus::NotStarted
-                    | HomingStatus::Done
-                    | HomingStatus::ErrorMoving
-                    | HomingStatus::ErrorStopped
-                    | HomingStatus::Unknown(_) => {}
-                }
-            }
+            Phase::Running { .. } => self.follow_homing(now, sample.status),
             Phase::AwaitingProfile(result) => {
                 if sample.mode == OperationMode::ProfilePosition {
                     match result.clone() {
@@ -253,29 +265,148 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             Phase::AwaitingPosition => {
-                let (wanted, here) = (homing.position, homing.here);
-                if self.is_new_position(sample.position.0, wanted, here) {
+                let wanted = homing.position;
+                if self.is_home(sample.position.0) {
                     self.image.count_from(wanted);
-                    self.target = self.on_the_wire(wanted).unwrap_or(self.target);
                     self.homed = true;
+                    self.envelope.settle();
                     self.finish(Ok(()));
                 }
             }
         }
     }
 
-    /// Whether the position after a homing to `wanted` is believed.
-    fn is_new_position(&self, position: i64, wanted: i64, here: bool) -> bool {
-        let modulo = self.settings.modulo();
-        let away = apart(modulo, position, wanted).abs();
-        let mirrored = apart(modulo, position, -wanted).abs();
-        if here {
-            away <= self.settings.tolerance_counts()
-        } else {
-            // A search ends somewhere beside the switch, but not at minus its place: there
-            // 0x607C has the other meaning, and the next move would go through the switch.
-            away < mirrored || apart(modulo, wanted, -wanted) == 0
+    fn start_homing(&mut self, now: Time) {
+        let Some(here) = self.image.here() else {
+            return;
+        };
+        let was_far = !self.is_home(here.position);
+        let Activity::Homing(homing) = &self.activity else {
+            return;
+        };
+        let still = Profile {
+            speed: 0.0,
+            acceleration: 1.0,
+        };
+        let reach = match homing.search {
+            Some(_) => self.search_reach(),
+            None => self.settings.figures().lag,
+        };
+        let profile = homing.search.unwrap_or(still);
+        self.envelope.begin_homing(here, reach, profile);
+        let phase = Phase::Running {
+            samples: 0,
+            begun: false,
+            was_far,
+            done_since: None,
+        };
+        self.enter_homing(now, phase, Some(self.settings.timeouts.homing));
+        self.send_control(now, Controlword::ENABLE_COMMAND | Controlword::MODE_4);
+    }
+
+    /// One statusword during the search.
+    fn follow_homing(&mut self, now: Time, word: Statusword) {
+        let status = HomingStatus::of(word);
+        let (period, patience) = (self.settings.common.sync_period, self.settings.timeouts);
+        let stands = self.image.plausible.stands();
+        let is_home = self
+            .image
+            .here()
+            .is_some_and(|here| self.is_home(here.position));
+        let Activity::Homing(homing) = &mut self.activity else {
+            return;
+        };
+        let Phase::Running {
+            samples,
+            begun,
+            was_far,
+            done_since,
+        } = &mut homing.phase
+        else {
+            return;
+        };
+        *samples = samples.saturating_add(1);
+        // Homed where it stands: nothing was searched, and the place says all.
+        let is_here = homing.search.is_none();
+        // Before that, the drive may not have had the start.
+        let has_heard = now.since(homing.since) >= period * 2;
+        *begun |=
+            status == HomingStatus::InProgress || has_heard && !word.contains(Statusword::MODE_12);
+        if *begun {
+            self.repeat_at = Time::NEVER;
         }
+        if status != HomingStatus::Done || !has_heard || !stands {
+            *done_since = None;
+        }
+        match status {
+            HomingStatus::Done if has_heard => {
+                let since = *done_since.get_or_insert(now);
+                // A drive may change its coordinates a little later, or with the mode.
+                let is_over = *begun && stands && now.since(since) >= patience.new_position / 2;
+                let is_new = *begun || *was_far && stands || is_here;
+                if is_home && is_new || is_over {
+                    self.restore(now, Ok(()));
+                }
+            }
+            HomingStatus::ErrorMoving | HomingStatus::ErrorStopped
+                if *begun || *samples > STALE_SAMPLES =>
+            {
+                let error = DeviceError::DriveRefused {
+                    node: self.node.id(),
+                    step: "homing",
+                    state: word.state(),
+                };
+                self.restore(now, Err(error));
+            }
+            HomingStatus::NotStarted
+            | HomingStatus::InProgress
+            | HomingStatus::Attained
+            | HomingStatus::Done
+            | HomingStatus::ErrorMoving
+            | HomingStatus::ErrorStopped
+            | HomingStatus::Unknown(_) => {}
+        }
+    }
+
+    fn search_profile(&self, speed: Q::Speed) -> Profile {
+        let count = self.settings.scale.resolution().abs().value();
+        Profile {
+            speed: speed.abs().value() / count,
+            acceleration: self.settings.homing_acceleration.abs().value() / count,
+        }
+    }
+
+    /// How far a search may go from where it begins.
+    fn search_reach(&self) -> i64 {
+        let settings = &self.settings;
+        let limits = settings.soft_limits;
+        let travel = limits.map(|(low, high)| settings.scale.to_counts(high - low).0.abs());
+        let turn = settings.turn.map(|turn| i64::from(turn.counts));
+        match (turn, travel) {
+            (Some(turn), _) => (turn as f64 * TURN_MARGIN) as i64 + settings.figures().lag,
+            (None, Some(travel)) => (travel as f64 * TRAVEL_MARGIN) as i64,
+            (None, None) => i64::MAX / 4,
+        }
+    }
+
+    /// How far from home the axis may stand after a homing.
+    fn beside_home(&self, search: Option<Profile>) -> i64 {
+        let tolerance = self.settings.tolerance_counts();
+        search.map_or(tolerance, |profile| {
+            let way = self
+                .envelope
+                .stopping_way(profile.speed, profile.acceleration);
+            way as i64 + self.settings.figures().lag
+        })
+    }
+
+    /// Whether the place shown is the home coordinate, as far as the axis stands beside its home.
+    fn is_home(&self, position: i64) -> bool {
+        let Activity::Homing(homing) = &self.activity else {
+            return false;
+        };
+        let modulo = self.settings.modulo();
+        apart(modulo, position, homing.position).abs() <= homing.beside
     }
 
     pub(super) fn homing_timeout(&mut self, now: Time) {
@@ -314,12 +445,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Phase::AwaitingProfile(Ok(())) => {
                 self.time_out(now, since, "profile position after homing", mode);
             }
-            Phase::AwaitingPosition => {
-                let seen = self.image.sample().map_or(Seen::Nothing, |sample| {
-                    Seen::Position(self.settings.scale.to_coordinate(sample.position).into())
-                });
-                self.time_out(now, since, "the new position after homing", seen);
-            }
+            Phase::AwaitingPosition => self.refuse_home(),
         }
     }
 }

@@ -7,6 +7,7 @@ use wire::cia402::{OperationMode, PowerState, Statusword};
 
 use super::modulo::Modulo;
 use super::start::{MODE_DISPLAY, POSITION_ACTUAL, STATUSWORD};
+use crate::device::envelope::Point;
 use crate::device::plausible::{Judgement, Plausible};
 
 /// Bytes of TPDO 1: statusword, position, mode.
@@ -79,6 +80,15 @@ impl Image {
         self.sample.as_ref()
     }
 
+    /// Where the axis is, and since when that is known.
+    pub(super) fn here(&self) -> Option<Point> {
+        let sample = self.sample.as_ref()?;
+        Some(Point {
+            at: sample.at,
+            position: sample.position.0,
+        })
+    }
+
     pub(super) const fn following_error(&self) -> Option<Counts> {
         self.following_error
     }
@@ -135,7 +145,10 @@ impl Image {
                 old.mode = sample.mode;
             }
             (None, Judgement::Doubted) => {}
-            (newest, Judgement::Believed | Judgement::Jumped { .. }) => *newest = Some(sample),
+            (
+                newest,
+                Judgement::Believed | Judgement::Jumped { .. } | Judgement::TooFast { .. },
+            ) => *newest = Some(sample),
         }
         judgement
     }

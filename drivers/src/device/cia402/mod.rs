@@ -20,6 +20,8 @@ mod commands;
 mod convert;
 mod course;
 mod cyclic;
+mod events;
+mod halt;
 mod homing;
 mod image;
 mod latch;
@@ -30,6 +32,7 @@ mod reference;
 mod settings;
 mod start;
 mod supervision;
+mod watch;
 
 #[cfg(test)]
 mod cyclic_tests;
@@ -45,7 +48,7 @@ use wire::Input;
 use wire::Payload;
 use wire::can::CanFrame;
 use wire::canopen::Function;
-use wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
+use wire::cia402::{Controlword, NamedStatus, OperationMode, PowerState, Statusword};
 
 pub use cyclic::{interpolation_period, period_from};
 pub use settings::{
@@ -53,15 +56,16 @@ pub use settings::{
     Turn,
 };
 
-use super::canopen_node::{CanopenNode, NodeEvent};
+use super::canopen_node::CanopenNode;
+use super::envelope::Envelope;
 use super::plausible::Plausible;
 use super::{Alarm, Axis, Device, DeviceError, DriveReference, Identity, RotaryAxis, Seen};
-use crate::protocol::script::Script;
 use cyclic::ModeChange;
+use halt::Halt;
 use homing::Homing;
 use image::{Image, Sample};
 use latch::{LatchChange, Probe};
-use motion::{Halt, Move};
+use motion::Move;
 use power::Power;
 use reference::BeforeHome;
 
@@ -79,6 +83,8 @@ enum Activity {
     Homing(Homing),
     Latch(LatchChange),
     Mode(ModeChange),
+    /// Its watch on our heartbeat is ended.
+    Release,
     /// What shows its reference is read, after this mark was written.
     Reference {
         mark: Option<u32>,
@@ -96,6 +102,7 @@ impl Activity {
             Self::Homing(_) => "homing",
             Self::Latch(_) => "setting the touch probe",
             Self::Mode(_) => "the change of mode",
+            Self::Release => "the end of its watch",
             Self::Reference { .. } => "reading its reference",
         }
     }
@@ -136,6 +143,9 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     /// What RPDO 1 said last.
     control: Controlword,
     target: i32,
+    /// The target of the last frame that was sent, and since when it is on the bus.
+    sent_target: Option<i32>,
+    target_at: Time,
     repeat_at: Time,
     /// Since when the set-point bit is low.
     lowered_at: Time,
@@ -147,6 +157,9 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     profile: Option<(u32, u32)>,
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i64>,
+    /// The drive was given a target that the axis has not reached, and that nothing has voided.
+    open_target: bool,
+    envelope: Envelope,
     /// A move that only has to be started.
     prepared: Option<Move>,
     started_at: Option<Time>,
@@ -168,11 +181,16 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     told_following: bool,
     cyclic_watch: cyclic::CyclicWatch,
     told_short: bool,
+    told_unasked: bool,
+    /// So many samples in a row show another mode than the one that was written.
+    other_mode: u8,
     outcome: Option<Result<(), DeviceError>>,
     alarms: VecDeque<Alarm>,
     short_pdos: u64,
     /// So often it was still enabled at a start.
     left_enabled: u64,
+    /// Told to enable, or found enabled, since the start.
+    was_enabled: bool,
     repeated_commands: u64,
 }
 
@@ -204,16 +222,19 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         Self {
             node: CanopenNode::new(settings.common, PROFILE),
             image,
-            settings,
             activity: Activity::Idle,
             control: Controlword::empty(),
             target: 0,
+            sent_target: None,
+            target_at: Time::ZERO,
             repeat_at: Time::NEVER,
             lowered_at: Time::ZERO,
             commanded_mode: None,
             supported_modes: None,
             profile: None,
             reached: None,
+            open_target: false,
+            envelope: Envelope::new(settings.figures()),
             prepared: None,
             started_at: None,
             homed: false,
@@ -228,11 +249,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             told_following: false,
             cyclic_watch: cyclic::CyclicWatch::default(),
             told_short: false,
+            told_unasked: false,
+            other_mode: 0,
             outcome: None,
             alarms: VecDeque::new(),
             short_pdos: 0,
             left_enabled: 0,
+            was_enabled: false,
             repeated_commands: 0,
+            settings,
         }
     }
 
@@ -262,6 +287,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
         self.control = control;
         self.repeat_at = now + self.settings.timeouts.repeat;
+        self.keep_target_at_axis();
+        if self.sent_target != Some(self.target) {
+            (self.sent_target, self.target_at) = (Some(self.target), now);
+        }
         let [a, b] = control.bits().to_le_bytes();
         let [c, d, e, f] = self.target.to_le_bytes();
         let cob_id = self.node.id().cob_id(Function::Rpdo1);
@@ -288,8 +317,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn seen_status(&self) -> Seen {
-        self.statusword()
-            .map_or(Seen::Nothing, |word| Seen::Statusword(word.bits()))
+        self.image.sample().map_or(Seen::Nothing, |sample| {
+            Seen::Statusword(NamedStatus::new(sample.status, Some(sample.mode)))
+        })
     }
 
     fn refuse(&mut self, step: &'static str, needs: &'static str) {
@@ -299,97 +329,6 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             step,
             needs,
         }));
-    }
-
-    fn alarm(&mut self, alarm: Alarm) {
-        self.alarms.push_back(alarm);
-        self.prepared = None;
-        let ends_it = match (&self.activity, alarm) {
-            (Activity::Idle | Activity::Starting, _) => false,
-            // Stopping and resetting go on: they are the answer to alarms. A drive that booted
-            // has nothing left to stop.
-            (Activity::Power(_) | Activity::Halt(_), Alarm::UnexpectedBootUp { .. }) => true,
-            (Activity::Power(_) | Activity::Halt(_), _) => false,
-            (
-                Activity::Move(_)
-                | Activity::Homing(_)
-                | Activity::Latch(_)
-                | Activity::Mode(_)
-                | Activity::Reference { .. },
-                _,
-            ) => true,
-        };
-        if ends_it {
-            let step = self.activity.name();
-            let device = self.node.name();
-            self.finish(Err(DeviceError::Alarmed {
-                device,
-                step,
-                alarm,
-            }));
-        }
-    }
-
-    fn pump(&mut self, now: Time) {
-        while let Some(event) = self.node.poll_event() {
-            match event {
-                NodeEvent::Described(script) => self.take_description(now, &script),
-                NodeEvent::Operational => {}
-                NodeEvent::ScriptDone(script) => self.script_done(now, &script),
-                NodeEvent::Failed(error) => self.script_failed(now, error),
-                NodeEvent::Alarm(alarm) => self.take_alarm(alarm),
-                NodeEvent::Pdo { number, frame } => self.take_pdo(now, number, &frame),
-                NodeEvent::PdoSilent { waited } => {
-                    let node = self.node.id();
-                    let period = self.settings.common.sync_period.as_nanos().max(1);
-                    let missed = u32::try_from(waited.as_nanos() / period).unwrap_or(u32::MAX);
-                    self.alarm(Alarm::PdoLost { node, missed });
-                }
-            }
-        }
-    }
-
-    fn take_description(&mut self, now: Time, script: &Script) {
-        self.probe.counts_edges = latch::counts_edges(&self.settings, script);
-        self.supported_modes = start::supported_modes(script);
-        let steps = start::check_description(&self.settings, script)
-            .and_then(|()| start::configuration(&self.settings, self.probe.counts_edges));
-        match steps {
-            Ok(steps) => self.node.configure(now, steps),
-            Err(error) => {
-                self.node.give_up(now);
-                self.finish(Err(error));
-            }
-        }
-    }
-
-    fn script_done(&mut self, now: Time, script: &Script) {
-        match &self.activity {
-            Activity::Starting => self.end_start(now, script),
-            Activity::Move(_) => self.move_prepared(now),
-            Activity::Homing(_) => {
-                self.note_before_home(script);
-                self.homing_prepared(now);
-            }
-            Activity::Latch(_) => self.latch_written(now),
-            Activity::Mode(_) => self.mode_written(now),
-            Activity::Reference { .. } => self.reference_read(script),
-            Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
-        }
-    }
-
-    fn script_failed(&mut self, now: Time, error: DeviceError) {
-        match &self.activity {
-            Activity::Homing(_) => self.homing_failed(now, error),
-            Activity::Starting | Activity::Move(_) => {
-                self.profile = None;
-                self.finish(Err(error));
-            }
-            Activity::Latch(_) | Activity::Mode(_) | Activity::Reference { .. } => {
-                self.finish(Err(error));
-            }
-            Activity::Idle | Activity::Power(_) | Activity::Halt(_) => {}
-        }
     }
 
     /// Ends whatever runs, without an outcome.
@@ -425,7 +364,10 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.node.handle_timeout(now);
         self.pump(now);
         match &self.activity {
-            Activity::Idle | Activity::Starting | Activity::Reference { .. } => {}
+            Activity::Idle
+            | Activity::Starting
+            | Activity::Release
+            | Activity::Reference { .. } => {}
             Activity::Power(_) => self.power_timeout(now),
             Activity::Move(_) => self.move_timeout(now),
             Activity::Halt(_) => self.halt_timeout(now),
@@ -438,7 +380,10 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
 
     fn poll_timeout(&self) -> Time {
         let activity = match &self.activity {
-            Activity::Idle | Activity::Starting | Activity::Reference { .. } => Time::NEVER,
+            Activity::Idle
+            | Activity::Starting
+            | Activity::Release
+            | Activity::Reference { .. } => Time::NEVER,
             Activity::Power(power) => power.poll_timeout(),
             Activity::Move(moving) => moving.deadline(),
             Activity::Halt(halt) => halt.deadline(),
@@ -464,11 +409,24 @@ impl<Q: Coordinate> Device for Cia402Drive<Q> {
         self.profile = None;
         self.commanded_mode = None;
         self.reached = None;
+        self.open_target = false;
+        self.sent_target = None;
+        self.envelope.release();
         self.kept = None;
+        self.was_enabled = false;
         (self.first, self.compared) = (None, None);
         self.probe.disarm();
         self.activity = Activity::Starting;
         self.node.start(now, start::description(&self.settings));
+    }
+
+    fn release_watch(&mut self, now: Time) -> bool {
+        self.supersede(now);
+        let begins = self.node.release_watch(now);
+        if begins {
+            self.activity = Activity::Release;
+        }
+        begins
     }
 
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {

@@ -1,9 +1,13 @@
-//! Profile position moves and halt (CiA 402, 10 and 8.4.4).
+//! Profile position moves (CiA 402, 10).
 //!
 //! The set-point handshake is by levels, so that a repeated or late frame cannot hurt:
 //! acknowledge seen low, new set-point high, acknowledge high, new set-point low, acknowledge
 //! low. Only after that does "target reached" count, and only with the position within the
 //! window: the bit may still be set from the move before.
+//!
+//! The target is on its way one SYNC before its edge: some drives take the edge first and the
+//! target of the same frame after that. A halted drive takes the new target under HALT, and HALT
+//! goes after that: without it, the drive would go on to the target before.
 
 use core::time::Duration;
 use units::{Coordinate, Counts, Time};
@@ -12,6 +16,7 @@ use wire::cia402::{Controlword, OperationMode, Statusword};
 use super::convert::{acceleration_counts, out_of_range, position_counts, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
 use super::{Activity, Cia402Drive};
+use crate::device::envelope::Profile;
 use crate::device::{DeviceError, Seen};
 use crate::protocol::script::Step;
 
@@ -25,6 +30,8 @@ enum MovePhase {
     AwaitingMode,
     /// The acknowledge of an older set-point must go.
     Releasing,
+    /// The target is on its way, without its edge.
+    Announcing,
     Raising,
     Lowering,
     Running,
@@ -54,28 +61,27 @@ impl Move {
         Counts(self.target)
     }
 
+    /// Whether its target is on the bus.
+    pub(super) const fn has_announced(&self) -> bool {
+        match self.phase {
+            MovePhase::Preparing | MovePhase::AwaitingMode | MovePhase::Releasing => false,
+            MovePhase::Announcing
+            | MovePhase::Raising
+            | MovePhase::Lowering
+            | MovePhase::Running => true,
+        }
+    }
+
     const fn awaited(&self) -> &'static str {
         match self.phase {
             MovePhase::Preparing => "the move's parameters",
             MovePhase::AwaitingMode => "the mode profile position",
             MovePhase::Releasing => "an older set-point to be released",
+            MovePhase::Announcing => "the target to be on its way",
             MovePhase::Raising => "the set-point to be acknowledged",
             MovePhase::Lowering => "the set-point to be released",
             MovePhase::Running => "the target to be reached",
         }
-    }
-}
-
-/// A halt under way.
-#[derive(Debug)]
-pub(super) struct Halt {
-    since: Time,
-    deadline: Time,
-}
-
-impl Halt {
-    pub(super) const fn deadline(&self) -> Time {
-        self.deadline
     }
 }
 
@@ -241,7 +247,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             // A mode that comes late: its bits 4 and 12 mean something else.
-            MovePhase::Releasing | MovePhase::Raising | MovePhase::Lowering if !in_mode => {
+            MovePhase::Releasing
+            | MovePhase::Announcing
+            | MovePhase::Raising
+            | MovePhase::Lowering
+                if !in_mode =>
+            {
                 self.release_set_point(now);
                 self.enter(now, MovePhase::AwaitingMode, self.settings.timeouts.mode);
             }
@@ -251,29 +262,25 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 }
             }
             MovePhase::Releasing => {
-                self.target = self.on_the_wire(set_point).unwrap_or(self.target);
-                if moving.only_prepared {
-                    let prepared = *moving;
-                    // The target without its edge: nothing moves.
-                    self.release_set_point(now);
-                    self.finish(Ok(()));
-                    self.prepared = Some(prepared);
-                } else {
-                    self.raise_set_point(now);
+                self.enter(now, MovePhase::Announcing, patience);
+                self.announce(now, set_point);
+                self.advance_move(now);
+            }
+            MovePhase::Announcing => {
+                if self.target_was_seen(now) {
+                    self.end_announcing(now);
                 }
             }
             MovePhase::Raising => {
                 if acknowledged {
                     self.started_at = Some(now);
                     self.enter(now, MovePhase::Lowering, patience);
-                    self.send_control(now, Controlword::ENABLE_COMMAND);
+                    self.release_set_point(now);
                 }
             }
             MovePhase::Lowering => {
                 if !acknowledged {
-                    let time = self.travel_time(set_point);
-                    self.enter(now, MovePhase::Running, time);
-                    self.repeat_at = Time::NEVER;
+                    self.set_off(now, set_point);
                 }
             }
             MovePhase::Running if self.nears_way_point(target, set_point) => {
@@ -303,7 +310,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             sample.mode == OperationMode::ProfilePosition
                 && !sample.status.contains(Statusword::MODE_12)
         });
-        if !ready || self.on_the_wire(prepared.set_point) != Some(self.target) {
+        let target = self.on_the_wire(prepared.set_point);
+        if !ready || target != Some(self.target) || self.sent_target != target {
             self.refuse(
                 "starting",
                 "a drive whose mode and set-point have not changed since the move was prepared",
@@ -318,21 +326,82 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         self.raise_set_point(now);
     }
 
+    /// Sends `set_point` without its edge: nothing moves.
+    pub(super) fn announce(&mut self, now: Time, set_point: i64) {
+        let target = self.on_the_wire(set_point).unwrap_or(self.target);
+        if self.target != target || self.sent_target != Some(target) {
+            self.target = target;
+            self.release_set_point(now);
+        }
+    }
+
+    /// A drive that looks at its frames once a cycle must have the target before the edge.
+    pub(super) fn target_was_seen(&self, now: Time) -> bool {
+        now.since(self.target_at) >= self.settings.common.sync_period
+    }
+
+    fn end_announcing(&mut self, now: Time) {
+        let Activity::Move(moving) = &self.activity else {
+            return;
+        };
+        if !moving.only_prepared {
+            self.raise_set_point(now);
+            return;
+        }
+        let prepared = *moving;
+        self.finish(Ok(()));
+        self.prepared = Some(prepared);
+    }
+
     fn raise_set_point(&mut self, now: Time) {
+        let Activity::Move(moving) = &self.activity else {
+            return;
+        };
+        let (target, profile) = (moving.target, moving.profile);
+        if let Some(here) = self.image.here() {
+            let (speed, acceleration) = (f64::from(profile.0), f64::from(profile.1));
+            self.envelope.begin_motion(
+                here,
+                target,
+                Profile {
+                    speed,
+                    acceleration,
+                },
+            );
+        }
+        self.open_target = true;
         let patience = self.settings.timeouts.set_point;
         self.enter(now, MovePhase::Raising, patience);
+        self.send_edge(now);
+    }
+
+    /// The edge of a new set-point. Under HALT the drive only takes the target.
+    pub(super) fn send_edge(&mut self, now: Time) {
+        let held = self.control & Controlword::HALT;
         let new = Controlword::MODE_4 | Controlword::MODE_5;
-        self.send_control(now, Controlword::ENABLE_COMMAND | new);
+        self.send_control(now, Controlword::ENABLE_COMMAND | held | new);
     }
 
     /// Takes the set-point bit back. Halt stays: an older target must not be resumed.
-    fn release_set_point(&mut self, now: Time) {
+    pub(super) fn release_set_point(&mut self, now: Time) {
         let held = self.control & Controlword::HALT;
         self.send_control(now, Controlword::ENABLE_COMMAND | held);
     }
 
+    /// The drive has its new target: HALT goes, if there was one.
+    fn set_off(&mut self, now: Time, set_point: i64) {
+        let time = self.travel_time(set_point);
+        self.enter(now, MovePhase::Running, time);
+        self.repeat_at = Time::NEVER;
+        if self.control.contains(Controlword::HALT) {
+            self.started_at = Some(now);
+            self.send_control(now, Controlword::ENABLE_COMMAND);
+            self.repeat_at = Time::NEVER;
+        }
+    }
+
     /// A drive that looks at the controlword once a cycle must have seen the bit low.
-    fn low_level_was_seen(&self, now: Time) -> bool {
+    pub(super) fn low_level_was_seen(&self, now: Time) -> bool {
         now.since(self.lowered_at) >= self.settings.common.sync_period * 2
     }
 
@@ -343,8 +412,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         };
         moving.reached = if there { moving.reached + 1 } else { 0 };
         if moving.reached >= REACHED_SAMPLES {
-            self.reached = Some(target);
-            self.finish(Ok(()));
+            self.arrive(target);
         }
     }
 
@@ -375,8 +443,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         if phase == MovePhase::Raising {
             self.send_control(now, Controlword::ENABLE_COMMAND);
             if self.arrived_at(target) {
-                self.reached = Some(target);
-                self.finish(Ok(()));
+                self.arrive(target);
                 return;
             }
         }
@@ -389,48 +456,24 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 MovePhase::Preparing
                 | MovePhase::AwaitingMode
                 | MovePhase::Releasing
+                | MovePhase::Announcing
                 | MovePhase::Raising
                 | MovePhase::Lowering
                 | MovePhase::Running,
                 _,
             ) => self.seen_status(),
         };
+        if self.open_target {
+            self.hold_back(now);
+        }
         self.time_out(now, since, awaited, seen);
     }
 
-    pub(super) fn begin_halt(&mut self, now: Time) {
-        self.reached = None;
-        self.image.plausible.watch_rest();
-        self.activity = Activity::Halt(Halt {
-            since: now,
-            deadline: now + self.settings.timeouts.standing,
-        });
-        // The bit stays set after the halt: without it the drive would go on to its target.
-        self.send_control(now, Controlword::ENABLE_COMMAND | Controlword::HALT);
-    }
-
-    pub(super) fn advance_halt(&mut self, now: Time) {
-        let Activity::Halt(halt) = &self.activity else {
-            return;
-        };
-        // A sample from before the halt says nothing yet.
-        let fresh = now.since(halt.since) >= self.settings.common.sync_period * 2;
-        let reached = self
-            .statusword()
-            .is_some_and(|word| word.contains(Statusword::TARGET_REACHED));
-        if fresh && reached && self.image.plausible.stands() {
-            self.finish(Ok(()));
-        }
-    }
-
-    pub(super) fn halt_timeout(&mut self, now: Time) {
-        let Activity::Halt(halt) = &self.activity else {
-            return;
-        };
-        if now >= halt.deadline {
-            let since = halt.since;
-            let seen = self.seen_status();
-            self.time_out(now, since, "the axis to stand still after a halt", seen);
-        }
+    /// The axis is at its target: nothing is left to go to.
+    fn arrive(&mut self, target: i64) {
+        self.reached = Some(target);
+        self.open_target = false;
+        self.envelope.hold(target);
+        self.finish(Ok(()));
     }
 }

@@ -1,7 +1,7 @@
 //! Enable, disable, quick stop and fault reset of a drive.
 
 use units::{Coordinate, Time};
-use wire::cia402::{Controlword, PowerState};
+use wire::cia402::{Controlword, OperationMode, PowerState};
 
 use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
@@ -13,6 +13,7 @@ use crate::protocol::script::Step;
 #[derive(Debug)]
 pub(super) struct Power {
     sequence: PowerSequence,
+    then: Then,
     since: Time,
 }
 
@@ -20,6 +21,17 @@ impl Power {
     pub(super) fn poll_timeout(&self) -> Time {
         self.sequence.poll_timeout()
     }
+}
+
+/// What follows a change of the power state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Then {
+    /// The command has ended.
+    Tell,
+    /// The drive is enabled anew.
+    Enable,
+    /// Nothing: no command asked for the change.
+    BeSilent,
 }
 
 const fn step_name(goal: Goal) -> &'static str {
@@ -39,27 +51,46 @@ const fn stops(goal: Goal) -> bool {
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
-    pub(super) fn begin_enable(&mut self, now: Time) {
-        let follows = self.is_cyclic() && self.state() == Some(PowerState::OperationEnabled);
-        if let Some(sample) = self.image.sample().filter(|_| !follows) {
-            // The target in RPDO 1 counts only at an edge, but a true one is the better company.
-            self.target = sample.shown;
+    /// An axis that is enabled stays as it is: nothing is sent that could set an old target free.
+    pub(super) fn begin_enable(&mut self, now: Time, was_moving: bool) {
+        self.was_enabled = true;
+        let enabled = self.state() == Some(PowerState::OperationEnabled);
+        if !enabled {
+            self.begin_power(now, Goal::OperationEnabled, Then::Tell);
+        } else if was_moving {
+            self.begin_halt(now);
+        } else if self.kept == Some(PowerState::OperationEnabled) && !self.waits_to_go_on() {
+            self.finish(Ok(()));
+        } else {
+            self.begin_power(now, Goal::SwitchOnDisabled, Then::Enable);
         }
-        self.begin_power(now, Goal::OperationEnabled);
     }
 
     pub(super) fn begin_disable(&mut self, now: Time) {
-        self.begin_power(now, Goal::SwitchOnDisabled);
+        self.begin_power(now, Goal::SwitchOnDisabled, Then::Tell);
     }
 
     pub(super) fn begin_reset(&mut self, now: Time) {
-        self.begin_power(now, Goal::FaultReset);
+        match self.state() {
+            Some(PowerState::OperationEnabled) => self.finish(Ok(())),
+            _ => self.begin_power(now, Goal::FaultReset, Then::Tell),
+        }
     }
 
     /// Goes out at once, whatever runs and whatever state the drive is in.
     pub(super) fn begin_quick_stop(&mut self, now: Time) {
+        self.stop_at_once(now, Then::Tell);
+    }
+
+    /// The same without a command: how a command ended before that stays to be asked for.
+    pub(super) fn stop_by_itself(&mut self, now: Time) {
+        self.node.drop_script(now);
+        self.stop_at_once(now, Then::BeSilent);
+    }
+
+    fn stop_at_once(&mut self, now: Time, then: Then) {
         self.image.plausible.watch_rest();
-        self.begin_power(now, Goal::QuickStop);
+        self.begin_power(now, Goal::QuickStop, then);
         if !self.node.is_in_service() {
             // A node that left operational hears no RPDO, but perhaps SDO.
             let stop = Controlword::QUICK_STOP_COMMAND.bits();
@@ -68,42 +99,62 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
-    fn begin_power(&mut self, now: Time, goal: Goal) {
+    fn begin_power(&mut self, now: Time, goal: Goal, then: Then) {
         self.kept = None;
         self.reached = None;
+        self.envelope.release();
         let sequence = PowerSequence::new(now, goal, self.settings.timeouts.transition);
         let first = sequence.first();
         self.activity = Activity::Power(Power {
             sequence,
+            then,
             since: now,
         });
         // Everything else waits for the next statusword: the last one may be out of date.
         if let Some(control) = first {
-            self.send_control(now, control);
+            self.send_control(now, self.with_halt(goal, control));
+        }
+    }
+
+    /// HALT stays on the way down: a drive that is slow to stop must not go on meanwhile.
+    fn with_halt(&self, goal: Goal, control: Controlword) -> Controlword {
+        match goal {
+            Goal::SwitchOnDisabled | Goal::QuickStop if !control.is_empty() => {
+                control | self.control & Controlword::HALT
+            }
+            Goal::SwitchOnDisabled
+            | Goal::QuickStop
+            | Goal::OperationEnabled
+            | Goal::FaultReset => control,
         }
     }
 
     pub(super) fn advance_power(&mut self, now: Time) {
         let standing = self.image.plausible.stands();
-        self.keep_target_at_axis();
+        let mode = self.mode().unwrap_or(OperationMode::None);
+        let runs_by_itself = self.runs_by_itself_in(mode);
         let (Activity::Power(power), Some(sample)) = (&mut self.activity, self.image.sample())
         else {
             return;
         };
+        let status = sample.status;
         let goal = power.sequence.goal();
-        let since = power.since;
+        let (since, then, timeout) = (power.since, power.then, power.poll_timeout());
         // Stopped is what the drive says after it has had the command, not what it said before.
         let fresh = sample.at.since(since) >= self.settings.common.sync_period * 2;
-        match power.sequence.next(now, sample.status, standing) {
-            PowerStep::Command(control) if control == self.control => {
-                if self.repeat_at == Time::NEVER {
+        match power.sequence.next(now, status, standing) {
+            PowerStep::Command(Controlword::ENABLE_COMMAND) if runs_by_itself => {
+                self.await_mode_while_off(now, since, mode);
+            }
+            PowerStep::Command(control) => {
+                let control = self.with_halt(goal, control);
+                if control != self.control || self.repeat_at == Time::NEVER {
                     self.send_control(now, control);
                 }
             }
-            PowerStep::Command(control) => self.send_control(now, control),
             PowerStep::Done(_) if !fresh && stops(goal) => {
-                if now >= power.poll_timeout() {
-                    let seen = Seen::Power(sample.status.state());
+                if now >= timeout {
+                    let seen = self.seen_status();
                     self.time_out(now, since, "a statusword after the command", seen);
                 }
             }
@@ -111,27 +162,96 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 if control != self.control {
                     self.send_control(now, control);
                 }
-                self.kept =
-                    (goal == Goal::OperationEnabled).then_some(PowerState::OperationEnabled);
-                self.finish(Ok(()));
+                self.power_reached(now, goal, then);
             }
             PowerStep::Failed(failure) => self.power_failed(now, goal, since, failure),
         }
     }
 
+    fn power_reached(&mut self, now: Time, goal: Goal, then: Then) {
+        match (goal, then) {
+            (Goal::OperationEnabled, _) => self.enabled(now),
+            (_, Then::Enable) => self.begin_power(now, Goal::OperationEnabled, Then::Tell),
+            (_, Then::BeSilent) => {
+                self.activity = Activity::Idle;
+                self.repeat_at = Time::NEVER;
+            }
+            (Goal::SwitchOnDisabled | Goal::QuickStop | Goal::FaultReset, Then::Tell) => {
+                self.finish(Ok(()));
+            }
+        }
+    }
+
+    /// The drive is enabled: from now on its axis is watched.
+    fn enabled(&mut self, now: Time) {
+        self.kept = Some(PowerState::OperationEnabled);
+        self.open_target = false;
+        self.other_mode = 0;
+        match (self.commanded_mode, self.mode()) {
+            (Some(expected), Some(seen)) if expected != seen => {
+                let node = self.node.id();
+                let (expected, seen) = (expected.raw(), seen.raw());
+                self.finish(Err(DeviceError::WrongMode {
+                    node,
+                    expected,
+                    seen,
+                }));
+                self.stop_by_itself(now);
+            }
+            (Some(OperationMode::CyclicSynchronousPosition), _) => {
+                self.watch_set_points();
+                self.finish(Ok(()));
+            }
+            _ => {
+                self.envelope.take_hold();
+                self.finish(Ok(()));
+            }
+        }
+    }
+
+    /// Whether a drive that is enabled in `mode` may move at once, by what was left in it.
+    fn runs_by_itself_in(&self, mode: OperationMode) -> bool {
+        let needs_an_edge = matches!(
+            mode,
+            OperationMode::None | OperationMode::ProfilePosition | OperationMode::Homing
+        );
+        // Its target is where the axis stands.
+        let is_cyclic = mode == OperationMode::CyclicSynchronousPosition;
+        !(needs_an_edge || is_cyclic || self.commanded_mode == Some(mode))
+    }
+
+    fn await_mode_while_off(&mut self, now: Time, since: Time, seen: OperationMode) {
+        if now.since(since) < self.settings.timeouts.mode {
+            return;
+        }
+        let expected = self.commanded_mode.map_or(0, OperationMode::raw);
+        self.send_control(now, Controlword::empty());
+        self.finish(Err(DeviceError::WrongMode {
+            node: self.node.id(),
+            expected,
+            seen: seen.raw(),
+        }));
+    }
+
     fn power_failed(&mut self, now: Time, goal: Goal, since: Time, failure: PowerFailure) {
         let step = step_name(goal);
-        if goal == Goal::FaultReset {
+        match goal {
             // Bit 7 goes back, so that the next reset has an edge.
-            self.send_control(now, Controlword::empty());
+            Goal::FaultReset => self.send_control(now, Controlword::empty()),
+            // A drive that is slow to be enabled must not become so later.
+            Goal::OperationEnabled if self.control == Controlword::ENABLE_COMMAND => {
+                self.send_control(now, Controlword::empty());
+            }
+            Goal::OperationEnabled | Goal::SwitchOnDisabled | Goal::QuickStop => {}
         }
         match failure {
             PowerFailure::Faulted { state } | PowerFailure::Wanders { state } => {
                 let node = self.node.id();
                 self.finish(Err(DeviceError::DriveRefused { node, step, state }));
             }
-            PowerFailure::TimedOut { from, awaited, .. } => {
-                self.time_out(now, since, awaited, Seen::Power(from));
+            PowerFailure::TimedOut { awaited, .. } => {
+                let seen = self.seen_status();
+                self.time_out(now, since, awaited, seen);
             }
         }
     }

@@ -9,6 +9,7 @@ use units::{
 
 use crate::device::ReferenceProof;
 use crate::device::canopen_node::NodeSettings;
+use crate::device::envelope::Figures;
 
 /// Everything the driver must know about one drive. [`Cia402Settings::new`] leaves to the
 /// drive what is `None`: it is then neither written nor checked.
@@ -30,6 +31,11 @@ pub struct Cia402Settings<Q: Coordinate = Metres> {
     pub soft_limits: Option<(Q, Q)>,
     /// How far the axis may lag behind the drive's demand (0x6065), and for how long (0x6066).
     pub following_error: Option<(Q, Duration)>,
+    /// How far an axis that holds its place may leave that; `None`: a tenth of the following
+    /// error, at least the position window.
+    pub hold_limit: Option<Q>,
+    /// Whether gravity pulls the axis: it is never let go.
+    pub gravity: bool,
     /// How near to its target the axis must be (0x6067) ...
     pub position_window: Q,
     /// ... and for how long (0x6068), for the drive to call it reached.
@@ -246,6 +252,8 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             latch: None,
             soft_limits: None,
             following_error: None,
+            hold_limit: None,
+            gravity: false,
             position_window,
             position_window_time: Duration::from_millis(10),
             quick_stop_deceleration: None,
@@ -263,6 +271,29 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             map_following_error: true,
             synchronous_start: false,
             timeouts: Cia402Timeouts::default(),
+        }
+    }
+
+    /// How far the axis may be from its demand.
+    fn lag_counts(&self) -> i64 {
+        let lag = self
+            .following_error
+            .map_or(self.jump_margin, |error| error.0);
+        self.scale.to_counts(lag).0.saturating_abs()
+    }
+
+    /// What its motion is judged by.
+    pub(super) fn figures(&self) -> Figures {
+        let (lag, window) = (self.lag_counts(), self.tolerance_counts());
+        let hold_limit = self.hold_limit.map_or(lag / 10, |limit| {
+            self.scale.to_counts(limit).0.saturating_abs()
+        });
+        Figures {
+            period: self.common.sync_period,
+            stall_max: self.stall_max,
+            lag: lag.max(window),
+            hold_limit: hold_limit.max(window),
+            window,
         }
     }
 

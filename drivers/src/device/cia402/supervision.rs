@@ -2,12 +2,13 @@
 
 use units::{Coordinate, Time};
 use wire::can::CanFrame;
-use wire::cia402::{OperationMode, PowerState, Statusword};
+use wire::cia402::{Controlword, OperationMode, PowerState, Statusword};
 
 use super::image::{SAMPLE_BYTES, Sample};
 use super::modulo::apart;
 use super::start::POSITION_ACTUAL;
 use super::{Activity, Cia402Drive};
+use crate::device::departure::Departure;
 use crate::device::plausible::Judgement;
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::script::{Script, Step};
@@ -23,6 +24,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             self.profile = None;
             self.commanded_mode = None;
             self.kept = None;
+            self.open_target = false;
+            self.sent_target = None;
+            self.envelope.release();
             self.probe.disarm();
             self.image.clear();
         }
@@ -75,12 +79,20 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 let (jump, limit) = (shown(by), shown(limit));
                 self.alarm(Alarm::PositionJump { node, jump, limit });
             }
+            Judgement::TooFast { seen, limit } => {
+                let asked = self.asked();
+                let alarm = self.shown(Departure::Speed { asked, limit, seen });
+                self.alarm(alarm);
+                self.stop_by_itself(now);
+            }
         }
         self.supervise(&sample);
+        self.watch_motion(now, &sample);
         match &self.activity {
             Activity::Idle
             | Activity::Starting
             | Activity::Latch(_)
+            | Activity::Release
             | Activity::Reference { .. } => {}
             Activity::Power(_) => self.advance_power(now),
             Activity::Move(_) => self.advance_move(now),
@@ -161,6 +173,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     /// would never end it. The start is done when it is off.
     fn stop_what_was_left(&mut self, now: Time) {
         self.left_enabled += 1;
+        // It may wait under HALT to go on to its target.
+        self.control |= Controlword::HALT;
+        self.was_enabled = true;
         self.begin_quick_stop(now);
     }
 

@@ -364,6 +364,10 @@ impl Device for Cia404Analog {
         self.module.start(now);
     }
 
+    fn release_watch(&mut self, now: Time) -> bool {
+        self.module.node.release_watch(now)
+    }
+
     fn poll_outcome(&mut self) -> Option<Result<(), DeviceError>> {
         self.module.outcome.take()
     }

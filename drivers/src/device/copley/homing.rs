@@ -10,8 +10,9 @@ use units::{Coordinate, Counts, Time};
 use wire::copley::{EventStatus, HomingMethod, Parameter, Trajectory, TrajectoryStatus};
 
 use super::convert::{acceleration, amplifier_counts, speed};
-use super::script::Step;
-use super::{Activity, CopleyAxis, read};
+use super::script::{Step, read};
+use super::{Activity, CopleyAxis};
+use crate::device::envelope::Profile;
 use crate::device::{DeviceError, Seen, Urgency};
 
 const PREPARING: &str = "setting the homing parameters";
@@ -71,6 +72,16 @@ pub(super) struct Homing {
     /// The coordinate at home, in counts.
     position: Counts,
     here: bool,
+    /// The search; `None`: homed where it stands.
+    search: Option<Profile>,
+    /// How far from its home the axis may stand afterwards.
+    beside: i64,
+    /// Whether bits are about this homing: the reference was seen to be gone, or a search to run.
+    begun: bool,
+    /// Whether the axis was elsewhere than its home before.
+    was_far: bool,
+    /// Since when the axis stands elsewhere, and the amplifier calls it referenced.
+    done_since: Option<Time>,
     since: Time,
     deadline: Time,
 }
@@ -94,10 +105,18 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             Ok((position, steps)) => {
                 self.homed = false;
                 self.started_at = None;
+                let search = search.map(|speed| self.settings.search_profile(speed));
+                let beside = self.beside_home(search);
+                let far = self.here().is_some_and(|here| here.position.abs() > beside);
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,
                     position,
                     here: search.is_none(),
+                    search,
+                    beside,
+                    begun: false,
+                    was_far: far,
+                    done_since: None,
                     since: now,
                     deadline: Time::NEVER,
                 });
@@ -174,8 +193,35 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         let patience = Some(self.settings.timeouts.homing);
         self.enter_homing(Phase::Running, patience, now);
         self.image.plausible.allow_jumps(true);
+        self.watch_search();
         self.image.plausible.watch_rest();
         self.look_anew(now);
+    }
+
+    fn watch_search(&mut self) {
+        let (Activity::Homing(homing), Some(here)) = (&self.activity, self.here()) else {
+            return;
+        };
+        match homing.search {
+            Some(profile) => {
+                let reach = self.settings.search_reach();
+                self.envelope.begin_homing(here, reach, profile);
+            }
+            // Nothing moves, and the coordinates change.
+            None => self.envelope.release(),
+        }
+    }
+
+    /// How far from its home the axis may stand after a homing.
+    fn beside_home(&self, search: Option<Profile>) -> i64 {
+        search.map_or_else(
+            || self.settings.tolerance_counts(),
+            |profile| {
+                let (speed, acceleration) = (profile.speed, profile.acceleration);
+                let way = self.envelope.stopping_way(speed, acceleration);
+                way as i64 + self.settings.figures().lag
+            },
+        )
     }
 
     pub(super) fn homing_unanswered(&mut self, now: Time) {
@@ -196,16 +242,17 @@ impl<Q: Coordinate> CopleyAxis<Q> {
 
     /// After each whole look.
     pub(super) fn advance_homing(&mut self, now: Time) {
-        let Activity::Homing(Homing {
-            phase: Phase::Running,
-            position,
-            here,
-            ..
-        }) = self.activity
-        else {
+        let status = self.image.trajectory;
+        let Some(at) = self.image.position().map(|(_, at)| at.0.abs()) else {
             return;
         };
-        let status = self.image.trajectory;
+        let stands = self.image.plausible.stands();
+        let Activity::Homing(homing) = &mut self.activity else {
+            return;
+        };
+        if homing.phase != Phase::Running {
+            return;
+        }
         if status.contains(TrajectoryStatus::HOMING_ERROR) {
             let error = DeviceError::Aborted {
                 device: self.name(),
@@ -215,20 +262,38 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             self.finish(Err(error));
             return;
         }
-        let busy = TrajectoryStatus::HOMING | TrajectoryStatus::RUNNING;
-        if status.intersects(busy) || !status.contains(TrajectoryStatus::REFERENCED) {
+        let busy = status.intersects(TrajectoryStatus::HOMING | TrajectoryStatus::RUNNING);
+        let referenced = status.contains(TrajectoryStatus::REFERENCED);
+        homing.begun |= busy || !referenced;
+        let is_home = at <= homing.beside;
+        // In between it may still settle.
+        let settled = homing.here || stands;
+        if busy || !referenced || !settled {
+            homing.done_since = None;
             return;
         }
-        let Some((_, at)) = self.image.position() else {
-            return;
-        };
-        // Beside a switch it comes to rest at its zero, too; in between it may still settle.
-        if at.0.abs() > self.settings.tolerance_counts() && (here || !self.image.plausible.stands())
-        {
+        if is_home && (homing.begun || homing.was_far || homing.here) {
+            let position = homing.position;
+            self.take_reference(now, position);
             return;
         }
+        let since = *homing.done_since.get_or_insert(now);
+        let begun = homing.begun;
+        if begun && !is_home && now.since(since) >= self.settings.timeouts.standing {
+            let seen = self.seen_position();
+            self.time_out(
+                now,
+                since,
+                "the place shown to become the home coordinate",
+                seen,
+            );
+        }
+    }
+
+    fn take_reference(&mut self, now: Time, position: Counts) {
         self.origin = position;
         self.homed = true;
+        self.envelope.settle();
         self.enter_homing(Phase::Limiting, None, now);
         match self.limit_steps() {
             Err(error) => self.finish(Err(error)),

@@ -1,15 +1,12 @@
 //! The newest state read from an amplifier, and whether it is plausible.
 
-use core::time::Duration;
 use std::collections::VecDeque;
 
 use units::{Counts, Time};
 use wire::copley::{EventStatus, Parameter, TrajectoryStatus};
 
+use super::watch::SAMPLED_EARLIER;
 use crate::device::plausible::{Judgement, Plausible};
-
-/// An amplifier samples when it is asked, not when its answer arrives.
-const SAMPLED_EARLIER: Duration = Duration::from_millis(20);
 
 /// Positions in counts of the amplifier.
 #[derive(Debug)]

@@ -35,17 +35,18 @@ mod steps;
 mod supervision;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 use std::collections::VecDeque;
 
 use units::{Coordinate, Counts, Metres, Quantity, Time};
-use wire::Payload;
 use wire::cia402::PowerState;
-use wire::copley::{BAUD_AT_RESET, Bank, EventStatus, Parameter};
-use wire::{Input, LinkState};
+use wire::copley::{BAUD_AT_RESET, EventStatus, Parameter};
+use wire::{Input, LinkState, Payload};
 
 pub use settings::{CopleySettings, CopleyTimeouts};
 
+use super::envelope::Envelope;
 use super::plausible::Plausible;
 use super::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DeviceName, DriveCommand, Identity,
@@ -56,7 +57,7 @@ use image::{Image, Look};
 use link::Link;
 use motion::{Halt, Motion, Plan};
 use power::Power;
-use script::{Script, Step};
+use script::Script;
 use start::Starting;
 
 /// What the amplifier is busy with.
@@ -103,6 +104,7 @@ pub struct CopleyAxis<Q: Coordinate = Metres> {
     script: Script,
     look: Look,
     image: Image,
+    envelope: Envelope,
     activity: Activity,
     identity: Option<Identity>,
     /// The start ends with the identity.
@@ -117,6 +119,9 @@ pub struct CopleyAxis<Q: Coordinate = Metres> {
     started_at: Option<Time>,
     /// It was enabled and must stay so.
     kept: bool,
+    was_enabled: bool,
+    /// The stop under way was asked for by nobody: it has no outcome.
+    stops_by_itself: bool,
     /// Alarms that were told and whose cause lasts.
     told: EventStatus,
     told_silence: bool,
@@ -139,6 +144,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             script: Script::nothing(),
             look: Look::new(),
             image,
+            envelope: Envelope::new(settings.figures()),
             activity: Activity::Idle,
             identity: None,
             asks_only: false,
@@ -148,6 +154,8 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             prepared: None,
             started_at: None,
             kept: false,
+            was_enabled: false,
+            stops_by_itself: false,
             told: EventStatus::empty(),
             told_silence: false,
             outcome: None,
@@ -172,13 +180,18 @@ impl<Q: Coordinate> CopleyAxis<Q> {
 
     fn finish(&mut self, result: Result<(), DeviceError>) {
         self.activity = Activity::Idle;
+        if let (Err(_), Some(here)) = (&result, self.here()) {
+            self.envelope.begin_stop(here);
+        }
         self.image.plausible.allow_jumps(false);
         self.script = Script::nothing();
         if self.purpose == Purpose::Step {
             self.purpose = Purpose::Nothing;
             self.link.cancel();
         }
-        self.outcome = Some(result);
+        if !core::mem::take(&mut self.stops_by_itself) {
+            self.outcome = Some(result);
+        }
     }
 
     fn time_out(&mut self, now: Time, since: Time, awaited: &'static str, seen: Seen) {
@@ -228,6 +241,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     /// Ends whatever runs, without an outcome.
     fn supersede(&mut self) {
         self.outcome = None;
+        self.stops_by_itself = false;
         self.prepared = None;
         self.script = Script::nothing();
         if self.purpose == Purpose::Step {
@@ -250,27 +264,6 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             Activity::Motion(_) => self.motion_step_done(now),
             Activity::Halt(_) => self.halt_sent(now),
             Activity::Homing(_) => self.homing_step_done(now),
-        }
-    }
-
-    fn alarm(&mut self, alarm: Alarm) {
-        self.alarms.push_back(alarm);
-        let restarted = matches!(alarm, Alarm::AmplifierRestarted { .. });
-        let ends_it = match &self.activity {
-            Activity::Idle | Activity::Starting(_) => false,
-            // Stopping and resetting go on: they are the answer to alarms.
-            Activity::Power(_) | Activity::Halt(_) => restarted,
-            Activity::Motion(_) | Activity::Homing(_) => true,
-        };
-        self.prepared = None;
-        if ends_it {
-            let step = self.activity.name();
-            let device = self.name();
-            self.finish(Err(DeviceError::Alarmed {
-                device,
-                step,
-                alarm,
-            }));
         }
     }
 }
@@ -384,11 +377,12 @@ impl<Q: Coordinate> Device for CopleyAxis<Q> {
 
 impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
     fn control(&mut self, now: Time, command: DriveCommand) {
+        let was_moving = self.is_moving();
         self.supersede();
         match command {
             _ if !self.is_in_service() => self.refuse_out_of_service(),
             DriveCommand::QuickStop => self.begin_quick_stop(now),
-            DriveCommand::Enable => self.begin_enable(now),
+            DriveCommand::Enable => self.begin_enable(now, was_moving),
             DriveCommand::Disable => self.begin_disable(now),
             DriveCommand::ResetFault => self.begin_reset(now),
             // An amplifier that is not enabled does not move: nothing is left to do.
@@ -410,6 +404,10 @@ impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
 
     fn is_homed(&self) -> bool {
         self.homed
+    }
+
+    fn was_enabled(&self) -> bool {
+        self.was_enabled
     }
 
     fn started_at(&self) -> Option<Time> {
@@ -478,6 +476,7 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
         let (at, position) = self.image.position()?;
         let scale = self.settings.scale;
         let counts = position + self.origin;
+        let in_place = self.envelope.is_in_place(position.0);
         let moving = self.image.events.contains(EventStatus::IN_MOTION)
             || matches!(self.activity, Activity::Motion(_) | Activity::Homing(_));
         Some(AxisReading {
@@ -488,13 +487,8 @@ impl<Q: Coordinate> Axis<Q> for CopleyAxis<Q> {
                 .image
                 .following_error
                 .map(|counts| scale.to_coordinate(counts)),
-            standing: !moving,
-            at_rest: self.image.plausible.stands(),
+            standing: !moving && in_place,
+            at_rest: in_place && self.image.plausible.stands(),
         })
     }
-}
-
-/// Reading in RAM, of which there is much.
-const fn read(parameter: Parameter, text: &'static str) -> Step {
-    Step::read(Bank::Ram, parameter, text)
 }

@@ -9,8 +9,9 @@ use units::{Coordinate, Counts, Time};
 use wire::copley::{EventStatus, Parameter, Trajectory, TrajectoryStatus};
 
 use super::convert::{acceleration, amplifier_counts, out_of_range, speed};
-use super::script::Step;
-use super::{Activity, CopleyAxis, read};
+use super::script::{Step, read};
+use super::{Activity, CopleyAxis};
+use crate::device::envelope::Profile;
 use crate::device::{DeviceError, Urgency};
 
 const LOADING: &str = "loading the move";
@@ -135,6 +136,13 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     }
 
     pub(super) fn begin_prepared(&mut self, now: Time, plan: Plan) {
+        if let Some(here) = self.here() {
+            let profile = Profile {
+                speed: plan.speed as f64 / 10.0,
+                acceleration: plan.acceleration as f64 * 10.0,
+            };
+            self.envelope.begin_motion(here, plan.target, profile);
+        }
         self.activity = Activity::Motion(Motion {
             plan,
             phase: Phase::Starting { attempts: 1 },
@@ -259,6 +267,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             return;
         }
         if away <= self.settings.tolerance_counts() {
+            self.envelope.hold(plan.target);
             self.finish(Ok(()));
         } else if self.image.trajectory.contains(TrajectoryStatus::ABORTED) {
             let error = DeviceError::Aborted {
@@ -286,6 +295,9 @@ impl<Q: Coordinate> CopleyAxis<Q> {
 
     pub(super) fn begin_halt(&mut self, now: Time) {
         self.image.plausible.watch_rest();
+        if let Some(here) = self.here() {
+            self.envelope.begin_stop(here);
+        }
         self.activity = Activity::Halt(Halt {
             since: now,
             deadline: now + self.settings.timeouts.standing,
@@ -302,6 +314,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         let sent = self.script.steps.is_empty();
         let in_motion = self.image.events.contains(EventStatus::IN_MOTION);
         if sent && (!in_motion || self.image.plausible.stands()) {
+            self.envelope.settle();
             self.finish(Ok(()));
         }
     }

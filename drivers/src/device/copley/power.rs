@@ -4,8 +4,8 @@ use units::{Coordinate, Time};
 use wire::cia402::PowerState;
 use wire::copley::{DesiredState, EventStatus, Faults, Parameter};
 
-use super::script::Step;
-use super::{Activity, CopleyAxis, read};
+use super::script::{Step, read};
+use super::{Activity, CopleyAxis};
 use crate::device::{DeviceError, Urgency};
 
 /// Any of these, and the motor is not under control.
@@ -71,6 +71,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
     }
 
     fn enter_power(&mut self, phase: Phase, since: Time, deadline: Time) {
+        self.envelope.release();
         self.activity = Activity::Power(Power {
             phase,
             since,
@@ -78,10 +79,12 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         });
     }
 
-    pub(super) fn begin_enable(&mut self, now: Time) {
+    pub(super) fn begin_enable(&mut self, now: Time, was_moving: bool) {
+        self.was_enabled = true;
         let deadline = now + self.settings.timeouts.transition;
         self.enter_power(Phase::Checking, now, deadline);
-        let steps = vec![read(Parameter::FAULTS, ENABLING)];
+        let mut steps = self.abort_first(was_moving);
+        steps.push(read(Parameter::FAULTS, ENABLING));
         self.run(now, steps, Urgency::Command);
     }
 
@@ -219,6 +222,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         match phase {
             Phase::AwaitingOn if self.is_enabled() => {
                 self.kept = true;
+                self.envelope.take_hold();
                 self.finish(Ok(()));
             }
             Phase::AwaitingRest => {

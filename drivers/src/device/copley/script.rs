@@ -139,3 +139,8 @@ impl Script {
         wire::copley::Reply::Value(value).number()
     }
 }
+
+/// Reading in RAM, of which there is much.
+pub(super) const fn read(parameter: Parameter, text: &'static str) -> Step {
+    Step::read(Bank::Ram, parameter, text)
+}

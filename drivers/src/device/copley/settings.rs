@@ -47,6 +47,10 @@ pub struct CopleySettings<Q: Coordinate = Metres> {
     pub position_window: Q,
     /// ... and for how long, for the amplifier to call it settled.
     pub position_window_time: Duration,
+    /// How far an enabled axis that nothing moves may be from where it stood; `None`: it is not judged.
+    pub hold_limit: Option<Q>,
+    /// Whether gravity pulls the axis: it is never let go.
+    pub gravity: bool,
     /// Deceleration of aborts: quick stop and halt.
     pub quick_stop_deceleration: Q::Acceleration,
     /// What the axis can do at most: faster moves are refused, faster positions not believed.
@@ -126,6 +130,8 @@ impl CopleySettings {
             following_error: None,
             position_window: Metres::from_um(1.0),
             position_window_time: Duration::from_millis(10),
+            hold_limit: None,
+            gravity: false,
             quick_stop_deceleration: acceleration_max,
             speed_max,
             acceleration_max,

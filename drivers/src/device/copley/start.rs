@@ -4,8 +4,8 @@ use units::{Coordinate, Counts, Time};
 use wire::copley::{Bank, DesiredState, EventStatus, Parameter};
 
 use super::convert::{acceleration, length};
-use super::{Activity, CopleyAxis, read};
-use crate::device::copley::script::{Script, Step};
+use super::{Activity, CopleyAxis};
+use crate::device::copley::script::{Script, Step, read};
 use crate::device::{DeviceError, Identity, Urgency};
 
 const ASKING: &str = "reading its identity";
@@ -33,6 +33,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         self.profile = None;
         self.started_at = None;
         self.kept = false;
+        self.was_enabled = false;
         self.told = EventStatus::empty();
         self.told_silence = false;
         self.purpose = super::Purpose::Nothing;

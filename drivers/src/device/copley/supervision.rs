@@ -179,6 +179,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         self.profile = None;
         self.kept = false;
         self.image.forget_position();
+        self.envelope.release();
         let device = self.name();
         self.alarm(Alarm::AmplifierRestarted { device });
     }
@@ -197,6 +198,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
             return;
         }
         self.supervise();
+        self.watch_motion(now);
         match &self.activity {
             Activity::Idle | Activity::Starting(_) => {}
             Activity::Power(_) => self.advance_power(now),

@@ -380,6 +380,12 @@ impl Dictionary {
         self.entry(object)?.parse(data)
     }
 
+    /// The present value at `object`; the number 0 where there is none.
+    pub fn value(&self, object: Object) -> Value {
+        let entry = self.get((object.index, object.sub));
+        entry.map_or(Value::Integer(0), |entry| entry.value.clone())
+    }
+
     /// Takes a value that [`Dictionary::check_value`] gave.
     pub fn put(&mut self, object: Object, value: Value) {
         if let Some(entry) = self.get_mut((object.index, object.sub)) {

@@ -35,12 +35,10 @@ impl Consumer {
         })
     }
 
-    /// The producer was heard; `true` when it was lost before.
-    pub(super) fn heard(&mut self, now: Time) -> bool {
-        let back = self.state == Watch::Lost;
+    /// The producer was heard.
+    pub(super) fn heard(&mut self, now: Time) {
         let deadline = now + self.time;
         self.state = Watch::Alive { deadline };
-        back
     }
 
     /// `true` once, when the producer has been silent for too long.

@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::named_objects::{ChangedWrite, NamedObject};
+
 /// What a node does wrong; the default is nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -59,6 +61,32 @@ pub struct Manners {
     pub tpdo_mute: bool,
     /// No heartbeat is sent, while everything else goes on.
     pub heartbeat_mute: bool,
+    /// Expedited uploads do not say how many bytes they have.
+    pub sdo_size_bit_omitted: bool,
+    /// Expedited uploads say that they have four bytes, whatever the object has.
+    pub sdo_always_four_bytes: bool,
+    /// Block transfers are refused.
+    pub sdo_blocks_refused: bool,
+    /// Objects that are not there for a master.
+    pub absent_objects: Vec<NamedObject>,
+    /// The abort code for objects that are not there, in place of the standard's.
+    pub absent_abort_code: Option<u32>,
+    /// Objects that can be written in most nodes and not in this one.
+    pub read_only_objects: Vec<NamedObject>,
+    /// COB-IDs of PDOs can be switched on and off only.
+    pub pdo_identifiers_fixed: bool,
+    /// Objects whose written values are rounded or cut.
+    pub changed_writes: Vec<ChangedWrite>,
+    /// 0x607D:01 is refused as long as 0x607D:02 was not written.
+    pub upper_soft_limit_first: bool,
+    /// The node says a second time, so long after the first, that it has booted.
+    pub boots_twice_after_ms: u64,
+    /// At power-on it produces SYNC itself with this period, until bit 30 of 0x1005 is cleared.
+    pub own_sync_ms: u32,
+    /// 0x1019 at power-on: a SYNC must carry a counter when it is 2 or more.
+    pub sync_counter_overflow: u8,
+    /// The node has neither 0x1016 nor 0x1017, and is guarded by 0x100C and 0x100D.
+    pub node_guarding_only: bool,
 }
 
 /// Deliveries by the name of the key in [`Manners`], or in the device's own faults, that asked
@@ -70,6 +98,8 @@ pub type Deliveries = BTreeMap<&'static str, u64>;
 pub(super) struct Rudeness {
     pub(super) left: Manners,
     pub(super) delivered: Deliveries,
+    /// 0x607D:02 was written.
+    pub(super) upper_limit_written: bool,
 }
 
 impl Rudeness {
@@ -77,6 +107,7 @@ impl Rudeness {
         Self {
             left: manners,
             delivered: Deliveries::new(),
+            upper_limit_written: false,
         }
     }
 

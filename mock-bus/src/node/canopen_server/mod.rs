@@ -13,9 +13,11 @@ pub mod communication;
 pub mod dictionary;
 mod errors;
 mod exchange;
+mod habits;
 mod heartbeat;
 mod listening;
 pub mod manners;
+mod named_objects;
 mod nmt;
 mod outbox;
 mod pdo;
@@ -40,8 +42,10 @@ pub use communication::{Description, Identity, PdoDefault};
 pub use dictionary::Dictionary;
 pub use errors::register;
 pub use manners::{Deliveries, Manners};
+pub use named_objects::{ChangedWrite, NamedObject};
 
 use errors::Errors;
+use habits::Habits;
 use heartbeat::Consumer;
 use listening::Listening;
 use manners::Rudeness;
@@ -71,6 +75,8 @@ pub enum ServerEvent {
     HeartbeatLost(NodeId),
     /// It is back.
     HeartbeatBack(NodeId),
+    /// No RPDO came within its deadline (0x1400:05).
+    RpdoLost,
 }
 
 /// The communication half of an emulated CANopen node.
@@ -123,12 +129,15 @@ pub struct CanopenServer {
     tpdos: Vec<Tpdo>,
     heartbeat_due: Time,
     consumers: Vec<Option<Consumer>>,
+    /// Who fell silent and has not been heard since.
+    lost_producer: Option<NodeId>,
     listening: Listening,
     errors: Errors,
     emergency_free: Time,
     outbox: Outbox,
     events: VecDeque<ServerEvent>,
     rudeness: Rudeness,
+    habits: Habits,
 }
 
 impl CanopenServer {
@@ -144,6 +153,7 @@ impl CanopenServer {
     ) -> Self {
         let mut dictionary = application;
         communication::insert(&mut dictionary, node, device);
+        habits::insert(&mut dictionary, &manners);
         let number = |count: usize| 0..count as u16;
         let rpdos = number(device.rpdos.len()).map(|n| Rpdo::read(&dictionary, n));
         let rpdos = rpdos.collect();
@@ -159,12 +169,14 @@ impl CanopenServer {
             dictionary,
             heartbeat_due: Time::NEVER,
             consumers: Vec::new(),
+            lost_producer: None,
             listening: Listening::default(),
             errors: Errors::default(),
             emergency_free: Time::ZERO,
             outbox: Outbox::default(),
             events: VecDeque::new(),
             rudeness: Rudeness::new(manners),
+            habits: Habits::default(),
         };
         server.power_on(Time::ZERO);
         server
@@ -217,7 +229,7 @@ impl CanopenServer {
     /// Whether `frame` means anything to this node.
     pub fn concerns(&self, frame: &CanFrame) -> bool {
         let id = frame.standard_id().filter(|_| !frame.is_remote());
-        id.is_some_and(|id| self.listening.contains(id))
+        id.is_some_and(|id| self.listening.contains(id)) || self.is_guard_request(frame)
     }
 
     /// What it listens to depends on its RPDOs and on whom it watches: whatever changes these calls
@@ -239,13 +251,18 @@ impl CanopenServer {
     /// Takes a frame from the bus.
     pub fn handle(&mut self, now: Time, frame: &CanFrame) {
         self.advance(now);
+        if self.is_guard_request(frame) {
+            return self.answer_guard(now);
+        }
         let Some(id) = frame.standard_id().filter(|_| !frame.is_remote()) else {
             return;
         };
         if id == NMT_COB_ID {
             self.handle_nmt(now, frame);
         } else if is_sync(frame) {
-            self.handle_sync();
+            if self.takes_sync(now, frame) {
+                self.handle_sync();
+            }
         } else if id == self.node.cob_id(Function::SdoRequest) {
             self.handle_sdo(now, frame);
         } else if let Ok((producer, _)) = parse_heartbeat(frame) {
@@ -266,6 +283,7 @@ impl CanopenServer {
         self.watch_heartbeats(now);
         self.expire_sdo(now);
         self.expire_rpdos(now);
+        self.follow_habits(now);
         self.send_due_tpdos(now);
         self.outbox.release(now);
     }
@@ -280,6 +298,7 @@ impl CanopenServer {
         let own = boot.min(self.heartbeat_due).min(self.sdo.deadline());
         let frames = self.outbox.next_event().min(self.next_process_event());
         let consumers = self.consumers.iter().flatten().map(Consumer::deadline);
+        let own = own.min(self.habits.next_event());
         consumers.fold(own.min(frames), Time::min)
     }
 

@@ -9,6 +9,7 @@ use wire::canopen::emcy::EmergencyCode;
 use wire::canopen::nmt::{NmtCommand, NmtState, emit_heartbeat};
 
 use super::errors::{Errors, register};
+use super::habits::Habits;
 use super::heartbeat::Consumer;
 use super::{CanopenServer, ServerEvent};
 
@@ -40,6 +41,7 @@ impl CanopenServer {
     /// The node gets power and boots.
     pub fn power_on(&mut self, now: Time) {
         self.dictionary.reset_all();
+        self.rudeness.upper_limit_written = false;
         self.errors = Errors::default();
         self.emergency_free = now;
         self.publish_errors();
@@ -49,6 +51,8 @@ impl CanopenServer {
     /// The node loses power: everything volatile is gone, nothing more is sent.
     pub fn power_off(&mut self) {
         self.phase = Phase::Off;
+        self.habits = Habits::default();
+        self.lost_producer = None;
         self.sdo.reset();
         self.outbox.clear();
         self.events.clear();
@@ -61,7 +65,8 @@ impl CanopenServer {
         self.sdo.reset();
         self.outbox.clear();
         self.heartbeat_due = Time::NEVER;
-        self.reload_consumers();
+        self.habits = Habits::default();
+        self.reload_consumers(now);
         self.reload_pdos(now);
         let until = now + self.boot_delay;
         self.phase = Phase::Booting { until };
@@ -72,6 +77,7 @@ impl CanopenServer {
             .send(emit_heartbeat(self.node, NmtState::BootUp));
         self.enter(now, NmtState::PreOperational);
         self.restart_heartbeat(now);
+        self.habits_after_boot(now);
     }
 
     pub(super) fn handle_nmt(&mut self, now: Time, frame: &CanFrame) {
@@ -100,7 +106,7 @@ impl CanopenServer {
         }
     }
 
-    fn enter(&mut self, now: Time, state: NmtState) {
+    pub(super) fn enter(&mut self, now: Time, state: NmtState) {
         let before = std::mem::replace(&mut self.phase, Phase::Running(state));
         if before == self.phase {
             return;
@@ -144,11 +150,17 @@ impl CanopenServer {
         };
     }
 
-    pub(super) fn reload_consumers(&mut self) {
+    /// Without a watch no producer is missed any more.
+    pub(super) fn reload_consumers(&mut self, now: Time) {
         let entries = self.get(0x1016, 0) as u8;
         let entry = |sub| Consumer::from_entry(self.get(0x1016, sub) as u32);
         self.consumers = (1..=entries).map(entry).collect();
         self.listen_anew();
+        if let Some(producer) = self.lost_producer
+            && self.consumers.iter().flatten().next().is_none()
+        {
+            self.find_heartbeat(now, producer);
+        }
     }
 
     pub(super) fn handle_heartbeat(&mut self, now: Time, producer: NodeId) {
@@ -156,10 +168,10 @@ impl CanopenServer {
             return;
         }
         let watching = self.consumers.iter_mut().flatten();
-        let mut watching = watching.filter(|consumer| consumer.producer == producer);
-        if watching.any(|consumer| consumer.heard(now)) {
-            self.clear(now, EmergencyCode::HEARTBEAT_LOST);
-            self.events.push_back(ServerEvent::HeartbeatBack(producer));
+        let watching = watching.filter(|consumer| consumer.producer == producer);
+        let heard = watching.map(|consumer| consumer.heard(now)).count() > 0;
+        if heard {
+            self.find_heartbeat(now, producer);
         }
     }
 
@@ -178,7 +190,8 @@ impl CanopenServer {
     }
 
     /// EMCY 0x8130, then what 0x1029:01 says: 0 leave operational, 1 nothing, 2 stop.
-    fn lose_heartbeat(&mut self, now: Time, producer: NodeId) {
+    pub(super) fn lose_heartbeat(&mut self, now: Time, producer: NodeId) {
+        self.lost_producer = Some(producer);
         let detail = [producer.raw(), 0, 0, 0, 0];
         let code = EmergencyCode::HEARTBEAT_LOST;
         self.raise(now, code, register::COMMUNICATION, detail);

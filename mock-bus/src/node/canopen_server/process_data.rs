@@ -69,6 +69,7 @@ impl CanopenServer {
             let bytes = raw.to_le_bytes();
             let length = self.dictionary.length(*object).unwrap_or(0);
             if let Ok(value) = self.dictionary.check_value(*object, &bytes[..length]) {
+                let value = self.rudeness.change_value(*object, value);
                 self.dictionary.put(*object, value);
                 self.events.push_back(ServerEvent::Written(*object));
             }
@@ -95,6 +96,7 @@ impl CanopenServer {
         }
         if expired && self.phase.is_operational() {
             self.raise(now, RPDO_TIMEOUT, register::COMMUNICATION, [0; 5]);
+            self.events.push_back(ServerEvent::RpdoLost);
         }
     }
 

@@ -27,6 +27,7 @@ impl Objects for ServedObjects<'_> {
     }
 
     fn read(&mut self, object: Object) -> Result<Vec<u8>, AbortCode> {
+        self.rudeness.refuse_absent(object)?;
         let beyond_history = object.index == 0x1003
             && i64::from(object.sub) > self.dictionary.integer(0x1003, 0)
             && self.dictionary.contains(object);
@@ -37,6 +38,8 @@ impl Objects for ServedObjects<'_> {
     }
 
     fn check_download(&mut self, object: Object, size: Option<usize>) -> Result<(), AbortCode> {
+        self.rudeness.refuse_absent(object)?;
+        self.rudeness.refuse_read_only(object)?;
         let concerned = self.rudeness.concerns(object.index);
         if concerned && self.rudeness.take("sdo_busy", |m| &mut m.sdo_busy) {
             return Err(AbortCode::DeviceState);
@@ -48,6 +51,9 @@ impl Objects for ServedObjects<'_> {
         self.check_download(object, Some(data.len()))?;
         let value = self.dictionary.check_value(object, data)?;
         rules::check(self.dictionary, object, &value)?;
+        let present = self.dictionary.value(object);
+        self.rudeness.refuse_value(object, &present, &value)?;
+        let value = self.rudeness.change_value(object, value);
         let mapping = matches!(Area::of(object.index), Area::Mapping { .. });
         let ignored =
             |m: &mut Rudeness| m.take("mapping_ignored_writes", |m| &mut m.mapping_ignored_writes);
@@ -74,6 +80,11 @@ impl CanopenServer {
         }
         self.flood_after_abort(frame);
         let mut replies = Vec::new();
+        if self.refuses_block(frame) {
+            let code = AbortCode::UnknownCommand;
+            let refusal = SdoResponse::Abort { object, code };
+            return self.send_replies(now, now, object, &[Reply::Response(refusal)]);
+        }
         let mut objects = ServedObjects {
             dictionary: &mut self.dictionary,
             rudeness: &mut self.rudeness,
@@ -113,6 +124,20 @@ impl CanopenServer {
         }
     }
 
+    fn refuses_block(&mut self, frame: &CanFrame) -> bool {
+        let request = SdoRequest::parse(frame.data());
+        let block = matches!(
+            request,
+            Ok(SdoRequest::BlockDownloadInitiate { .. } | SdoRequest::BlockUploadInitiate { .. })
+        );
+        let busy = self.sdo.takes_block_segments();
+        block
+            && !busy
+            && self
+                .rudeness
+                .switched("sdo_blocks_refused", |m| m.sdo_blocks_refused)
+    }
+
     /// What a write sets off; the time the node works on it before it answers.
     fn after_write(&mut self, now: Time, object: Object) -> Duration {
         match (object.index, object.sub) {
@@ -129,7 +154,8 @@ impl CanopenServer {
                 self.set(0x1011, 1, 1);
                 self.dictionary.restore_factory();
             }
-            (0x1016, _) => self.reload_consumers(),
+            (0x1005 | 0x1006 | 0x1019, _) => self.restart_own_sync(now),
+            (0x1016, _) => self.reload_consumers(now),
             (0x1017, _) => self.restart_heartbeat(now),
             (index, _) => self.reload_pdo(now, Area::of(index)),
         }
@@ -195,7 +221,7 @@ impl Rudeness {
         }
         let response = self.spoil_toggle(response);
         let mut right = self.spoil_size(response).emit();
-        self.leave_stale_bytes(response, &mut right);
+        self.spoil_expedited(response, &mut right);
         let mut payloads = Vec::new();
         let mut payload = right.to_vec();
         if response.object().is_some() {
@@ -238,12 +264,22 @@ impl Rudeness {
         }
     }
 
-    /// The unused bytes of an expedited value, which the standard reserves and some leave.
-    fn leave_stale_bytes(&mut self, response: SdoResponse, payload: &mut [u8; 8]) {
-        if let SdoResponse::UploadExpedited { data, .. } = response
-            && self.switched("sdo_stale_bytes", |m| m.sdo_stale_bytes)
-        {
+    /// The unused bytes of an expedited value, which the standard reserves and some leave, and
+    /// what its command says of its size.
+    fn spoil_expedited(&mut self, response: SdoResponse, payload: &mut [u8; 8]) {
+        const NO_SIZE: u8 = 0x42;
+        const FOUR_BYTES: u8 = 0x43;
+        let SdoResponse::UploadExpedited { data, .. } = response else {
+            return;
+        };
+        if self.switched("sdo_stale_bytes", |m| m.sdo_stale_bytes) {
             payload[4 + data.data().len()..].fill(0xA5);
+        }
+        if self.switched("sdo_size_bit_omitted", |m| m.sdo_size_bit_omitted) {
+            payload[0] = NO_SIZE;
+        } else if self.left.sdo_always_four_bytes && payload[0] != FOUR_BYTES {
+            self.count("sdo_always_four_bytes");
+            payload[0] = FOUR_BYTES;
         }
     }
 

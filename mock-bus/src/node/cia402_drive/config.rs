@@ -3,6 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use wire::canopen::NodeId;
 
+use super::quirks::DriveQuirks;
 use crate::node::canopen_server::{Identity, Manners};
 
 /// An emulated CiA 402 drive; every key has a default.
@@ -67,6 +68,8 @@ pub struct Cia402DriveConfig {
     pub has_index: bool,
     /// 0x605A at power-on: 6 as in EPOS4 (stay in quick stop active), 2 as in most others.
     pub quick_stop_option: i16,
+    /// The drive holds its axis so long while its brake falls in; 0 without a brake.
+    pub brake_engage_ms: u64,
     /// 0x6007 at power-on: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
     pub abort_connection_option: i16,
     /// The encoder is absolute and the drive stores its origin: both are there again after a power cycle.
@@ -160,26 +163,6 @@ pub(super) struct PowerOn {
     pub(super) homing_may_begin_within: i64,
 }
 
-/// What real drives do and a polite one would not; the default is nothing. Each is counted as
-/// delivered, under the name of its key, when it made a difference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DriveQuirks {
-    /// The statusword keeps the value it has, whatever the drive does.
-    pub statusword_stuck: bool,
-    /// The drive never gets from switched on to operation enabled.
-    pub enable_refused: bool,
-    /// A new set-point equal to the last one is not acknowledged.
-    pub identical_target_ignored: bool,
-    /// Target reached (bit 10) never comes.
-    pub target_never_reached: bool,
-    /// Fault resets have no effect.
-    pub fault_reset_ignored: bool,
-    /// The motor is wired the wrong way round: the demand is mirrored about where it stood
-    /// when it was enabled.
-    pub direction_reversed: bool,
-}
-
 impl Default for Cia402DriveConfig {
     fn default() -> Self {
         Self {
@@ -211,6 +194,7 @@ impl Default for Cia402DriveConfig {
             homing_search_limit_mm: 500.0,
             has_index: false,
             quick_stop_option: 6,
+            brake_engage_ms: 0,
             abort_connection_option: 3,
             absolute_encoder: false,
             increments_are_homed: false,

@@ -83,7 +83,7 @@ impl Drive {
             return target;
         }
         // A set-point is rounded to a count, so that a constant speed at the limit is one too.
-        let reach = self.get(0x607F) as f64 * period.as_secs_f64() + 1.0;
+        let reach = self.speed(0x607F, 0) * period.as_secs_f64() + 1.0;
         target.clamp(from - reach, from + reach)
     }
 
@@ -118,7 +118,7 @@ impl Drive {
         let rose = new.contains(Controlword::HALT) && !old.contains(Controlword::HALT);
         if rose && self.is_moving_itself() {
             let option = self.get(0x605D);
-            let deceleration = self.get(if option == 2 { 0x6085 } else { 0x6084 });
+            let deceleration = self.acceleration(if option == 2 { 0x6085 } else { 0x6084 });
             self.ramp(now, deceleration, After::Stay);
         }
     }

@@ -36,12 +36,14 @@ impl Drive {
             && matches!(self.activity, Activity::Homing(_))
         {
             self.homing = HomingStatus::NotStarted;
-            self.ramp(now, self.get(0x609A), After::Stay);
+            self.ramp(now, self.acceleration(0x609A), After::Stay);
         }
     }
 
     fn start_homing(&mut self, now: Time, m: &mut impl Mechanism) {
         self.homed = false;
+        self.homings.begun += 1;
+        self.begin_stale_bits(now);
         self.homing = HomingStatus::InProgress;
         match self.get(0x6098) {
             35 | 37 => {
@@ -83,23 +85,22 @@ impl Drive {
     /// Plans the motion of a step.
     fn enter(&mut self, now: Time, run: HomingRun, step: Step) {
         let from = self.demand(now);
-        let acceleration = self.get(0x609A) as f64;
-        let towards = |direction: f64, velocity: i64| {
+        let acceleration = self.acceleration(0x609A);
+        let towards = |direction: f64, velocity: f64| {
             let limits = MotionLimits {
-                velocity: velocity as f64,
+                velocity,
                 acceleration,
                 deceleration: acceleration,
             };
             Profile::to_target(now, from, from.position + direction * FAR, limits)
         };
         self.profile = match step {
-            Step::Seek => towards(run.direction, self.server.get(0x6099, 1)),
-            Step::BackOff | Step::Index { .. } => {
-                towards(-run.direction, self.server.get(0x6099, 2))
-            }
+            Step::Seek => towards(run.direction, self.homing_speed(1)),
+            Step::BackOff | Step::Index { .. } => towards(-run.direction, self.homing_speed(2)),
             Step::Stop | Step::Settle => Profile::stopping(now, from, acceleration),
         };
         self.activity = Activity::Homing(HomingRun { step, ..run });
+        self.count_units();
         self.look_now();
     }
 
@@ -151,11 +152,13 @@ impl Drive {
     fn set_home(&mut self, position: i64) {
         self.shift(self.get(0x607C) - position);
         self.homed = true;
+        self.homings.attained += 1;
+        self.leave_homing_bits();
     }
 
     pub(super) fn fail_homing(&mut self, now: Time) {
         self.homing = HomingStatus::ErrorMoving;
-        self.ramp(now, self.get(0x609A), After::HomingError);
+        self.ramp(now, self.acceleration(0x609A), After::HomingError);
     }
 
     pub(super) fn homing_error_stopped(&mut self) {

@@ -6,7 +6,7 @@
 //! demand at the servo rate while something moves, and none while nothing does.
 //!
 //! Source: CiA 402-2 and -3 (IEC 61800-7-201), CiA 301; the quirks are those of the drives in
-//! protocols.md, 3.4. Absent: velocity and torque modes, jerk.
+//! protocols.md, 3.4. Absent: torque modes, jerk; profile velocity unless it is the mode left over.
 //!
 //! | symbol | name |
 //! |---|---|
@@ -14,16 +14,19 @@
 //! | 0x6062 | demand, from the [profile](super::profile) |
 //! | 0x60F4 | following error = demand − actual |
 
+mod brake;
 mod config;
 mod cyclic;
 mod homing;
 mod homing_run;
 mod mechanism;
+mod misbehaviour;
 mod motion;
 mod objects;
 mod position_range;
 mod positioning;
 mod power;
+mod quirks;
 mod status;
 mod supervision;
 mod supply;
@@ -31,6 +34,7 @@ mod supply;
 mod tests;
 mod touch_probe;
 mod transitions;
+mod truth;
 
 use std::time::Duration;
 
@@ -40,10 +44,12 @@ use wire::can::CanFrame;
 use wire::canopen::NodeId;
 use wire::canopen::emcy::EmergencyCode;
 use wire::canopen::nmt::NmtState;
-use wire::cia402::{Controlword, HomingStatus, PowerState};
+use wire::cia402::{Controlword, HomingStatus};
 
 pub(in crate::node) use config::checked_node_id;
-pub use config::{Cia402DriveConfig, DriveQuirks, RotaryDriveConfig, TouchProbeConfig};
+pub use config::{Cia402DriveConfig, RotaryDriveConfig, TouchProbeConfig};
+pub use quirks::{DriveQuirks, RpdoDeadline, UnitObjects};
+pub use truth::Homings;
 
 use super::canopen_server::{CanopenServer, Deliveries, Manners, ServerEvent};
 use super::profile::Profile;
@@ -53,11 +59,13 @@ use crate::plant::Plant;
 use crate::plant::config::PlantConfig;
 use cyclic::Cyclic;
 use mechanism::{Mechanism, PlantAxis};
+use misbehaviour::Memory;
 use motion::Activity;
 use positioning::Positioning;
-use power::{Command, Power};
+use power::{Command, Power, Transition};
 
 const PROFILE_POSITION: i64 = 1;
+const PROFILE_VELOCITY: i64 = 3;
 const HOMING: i64 = 6;
 const CYCLIC_POSITION: i64 = 8;
 
@@ -129,16 +137,6 @@ impl Cia402DriveNode {
     /// How the drive itself misbehaves.
     pub fn quirks_mut(&mut self) -> &mut DriveQuirks {
         &mut self.drive.config.quirks
-    }
-
-    /// The drive's state as it is, whatever its statusword says: for judges only.
-    pub const fn power_state(&self) -> PowerState {
-        self.drive.power.wire()
-    }
-
-    /// When the motion to the last set-point truly began: for judges only.
-    pub const fn moved_at(&self) -> Option<Time> {
-        self.drive.moved_at
     }
 
     /// Which faults were delivered, and how often.
@@ -238,6 +236,8 @@ struct Drive {
     /// The next transition is not before this.
     power_free: Time,
     controlword: Controlword,
+    /// The mode in force, whatever 0x6061 shows.
+    mode: i64,
     mode_due: Time,
     /// Actual position = sign · encoder counts + offset.
     offset: i64,
@@ -249,6 +249,7 @@ struct Drive {
     activity: Activity,
     positioning: Positioning,
     homing: HomingStatus,
+    homings: Homings,
     cyclic: Cyclic,
     /// Whether the power stage controls the motor.
     servo_on: bool,
@@ -267,6 +268,7 @@ struct Drive {
     local_control: bool,
     heartbeat_lost: bool,
     internal_error: Option<EmergencyCode>,
+    memory: Memory,
 }
 
 impl Drive {
@@ -279,13 +281,14 @@ impl Drive {
             objects::dictionary(&config),
             config.manners.clone(),
         );
-        Self {
+        let mut drive = Self {
             config,
             server,
             power: Power::NotReady,
             command: None,
             power_free: Time::ZERO,
             controlword: Controlword::empty(),
+            mode: PROFILE_POSITION,
             mode_due: Time::NEVER,
             offset: 0,
             homed: false,
@@ -295,6 +298,7 @@ impl Drive {
             activity: Activity::Standing,
             positioning: Positioning::default(),
             homing: HomingStatus::NotStarted,
+            homings: Homings::default(),
             cyclic: Cyclic::IDLE,
             servo_on: false,
             sent_demand: None,
@@ -309,7 +313,11 @@ impl Drive {
             local_control: false,
             heartbeat_lost: false,
             internal_error: None,
-        }
+            memory: Memory::NOTHING,
+        };
+        drive.mode = drive.get(0x6060);
+        drive.remember_nothing();
+        drive
     }
 
     /// Looks after itself as soon as it is advanced.
@@ -325,6 +333,7 @@ impl Drive {
         if !self.server.only_samples_at(frame) {
             self.publish(now, m);
         }
+        self.note_target();
         self.server.handle(now, frame);
         self.settle(now, m);
     }
@@ -338,6 +347,7 @@ impl Drive {
         }
         if self.server.next_event() <= now || self.server.reports_changes() {
             self.publish(now, m);
+            self.note_target();
             self.server.advance(now);
             self.settle(now, m);
         }
@@ -352,6 +362,9 @@ impl Drive {
 
     fn own_event(&self) -> Time {
         let transition = match self.pending_transition() {
+            Some(Transition::T4) if self.memory.enable_due != Time::NEVER => {
+                self.power_free.max(self.memory.enable_due)
+            }
             Some(_) => self.power_free,
             None => Time::NEVER,
         };
@@ -403,6 +416,8 @@ impl Drive {
             ServerEvent::Written(object) => match object.index {
                 0x6040 => self.on_controlword(now, m),
                 0x6060 => self.change_mode(now),
+                0x607A => self.note_target_in_order(),
+                0x60FF => self.run_at_speed(now),
                 0x60B8 => self.on_probe_function(),
                 _ => {}
             },
@@ -421,10 +436,8 @@ impl Drive {
             }
             ServerEvent::ResetNode => self.boot(m),
             ServerEvent::ResetCommunication => self.abort_connection(now, m),
-            ServerEvent::HeartbeatLost(_) => {
-                self.heartbeat_lost = true;
-                self.abort_connection(now, m);
-            }
+            ServerEvent::HeartbeatLost(_) => self.lose_master(now, m),
+            ServerEvent::RpdoLost => self.lose_rpdo(now, m),
             ServerEvent::HeartbeatBack(_) => self.heartbeat_lost = false,
         }
     }
@@ -433,12 +446,14 @@ impl Drive {
         self.server.get(index, 0)
     }
 
-    /// 0x6061, the mode in force.
-    fn mode(&self) -> i64 {
-        self.get(0x6061)
+    const fn mode(&self) -> i64 {
+        self.mode
     }
 
     fn change_mode(&mut self, now: Time) {
+        if self.ignores_mode() {
+            return;
+        }
         let lag = Duration::from_millis(self.config.mode_lag_ms);
         self.mode_due = now + lag;
     }
@@ -453,12 +468,14 @@ impl Drive {
         if mode == self.mode() {
             return;
         }
-        self.server.set(0x6061, 0, mode);
+        self.mode = mode;
+        self.show_mode();
         self.homing = HomingStatus::NotStarted;
         self.positioning = Positioning::at(self.profile.end_position());
         if self.power == Power::OperationEnabled && self.is_moving_itself() {
-            let deceleration = self.get(0x6084);
+            let deceleration = self.acceleration(0x6084);
             self.ramp(now, deceleration, motion::After::Stay);
         }
+        self.run_at_speed(now);
     }
 }

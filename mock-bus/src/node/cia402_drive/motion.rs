@@ -22,6 +22,10 @@ pub(super) enum Activity {
     Ramp(After),
     /// Set-points of every SYNC.
     Cyclic,
+    /// A constant speed.
+    Velocity,
+    /// The brake falls in; the torque goes then.
+    Braking { until: Time, to: Power },
 }
 
 /// What comes at the end of a ramp.
@@ -63,8 +67,10 @@ impl Drive {
     /// Whether a ramp is needed before the drive does something else.
     pub(super) const fn is_moving_itself(&self) -> bool {
         match self.activity {
-            Activity::Positioning | Activity::Homing(_) | Activity::Cyclic => true,
-            Activity::Standing | Activity::Ramp(_) => false,
+            Activity::Positioning | Activity::Homing(_) | Activity::Cyclic | Activity::Velocity => {
+                true
+            }
+            Activity::Standing | Activity::Ramp(_) | Activity::Braking { .. } => false,
         }
     }
 
@@ -76,14 +82,18 @@ impl Drive {
             && !self.target_reached(now);
         let active = match self.activity {
             Activity::Standing | Activity::Cyclic => !self.profile.is_done(now),
-            Activity::Positioning | Activity::Homing(_) | Activity::Ramp(_) => true,
+            Activity::Positioning
+            | Activity::Homing(_)
+            | Activity::Ramp(_)
+            | Activity::Braking { .. }
+            | Activity::Velocity => true,
         };
         active || arriving || self.following_since.is_some()
     }
 
     /// Slows down from the present demand.
-    pub(super) fn ramp(&mut self, now: Time, deceleration: i64, after: After) {
-        self.profile = Profile::stopping(now, self.demand(now), deceleration as f64);
+    pub(super) fn ramp(&mut self, now: Time, deceleration: f64, after: After) {
+        self.profile = Profile::stopping(now, self.demand(now), deceleration);
         self.activity = Activity::Ramp(after);
         self.look_now();
     }
@@ -108,6 +118,8 @@ impl Drive {
         self.enabled_at = here;
         self.in_window_since = None;
         self.internal_limit = false;
+        self.forget_acknowledge();
+        self.run_at_speed(now);
         self.look_now();
         self.command_servo(now, m);
     }
@@ -118,6 +130,18 @@ impl Drive {
             self.profile = Profile::resting(self.actual(m) as f64);
             return;
         }
+        if matches!(self.activity, Activity::Braking { .. }) {
+            return;
+        }
+        let demand = self.servo_demand(now, m);
+        if self.sent_demand != Some(demand) {
+            self.sent_demand = Some(demand);
+            m.set_servo(Servo::Follow { demand });
+        }
+    }
+
+    /// The demand in metres or radians, as the plant takes it.
+    pub(super) fn servo_demand(&mut self, now: Time, m: &impl Mechanism) -> f64 {
         let mut position = self.demand(now).position;
         if self.config.quirks.direction_reversed {
             if position != self.enabled_at {
@@ -126,35 +150,32 @@ impl Drive {
             position = 2.0 * self.enabled_at - position;
         }
         let counts = self.sign() as f64 * (position - self.offset as f64);
-        let demand = counts * m.resolution();
-        if self.sent_demand != Some(demand) {
-            self.sent_demand = Some(demand);
-            m.set_servo(Servo::Follow { demand });
-        }
+        counts * m.resolution()
     }
 
     /// What the demand's profile was for may be over.
     pub(super) fn proceed(&mut self, now: Time, m: &mut impl Mechanism) {
         match self.activity {
-            Activity::Standing | Activity::Cyclic => {}
+            Activity::Standing | Activity::Cyclic | Activity::Velocity => {}
             Activity::Homing(run) => self.home_on(now, run, m),
             Activity::Positioning if self.profile.is_done(now) => self.next_set_point(now, m),
             Activity::Ramp(after) if self.profile.is_done(now) => {
                 self.activity = Activity::Standing;
-                self.after_ramp(after, m);
+                self.after_ramp(now, after, m);
             }
-            Activity::Positioning | Activity::Ramp(_) => {}
+            Activity::Braking { until, to } if until <= now => {
+                self.switch_off(m);
+                self.power = to;
+            }
+            Activity::Positioning | Activity::Ramp(_) | Activity::Braking { .. } => {}
         }
     }
 
-    fn after_ramp(&mut self, after: After, m: &mut impl Mechanism) {
+    fn after_ramp(&mut self, now: Time, after: After, m: &mut impl Mechanism) {
         match after {
             After::Stay => {}
             After::HomingError => self.homing_error_stopped(),
-            After::Off(power) => {
-                self.switch_off(m);
-                self.power = power;
-            }
+            After::Off(power) => self.release(now, power, m),
         }
     }
 

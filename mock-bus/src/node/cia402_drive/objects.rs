@@ -5,6 +5,7 @@ use wire::canopen::pdo::MappedObject;
 use wire::canopen::{Function, NodeId};
 
 use super::config::Cia402DriveConfig;
+use super::quirks::UnitObjects;
 use crate::node::canopen_server::dictionary::{Access, Bounds, Dictionary, Entry, Kind, Mapping};
 use crate::node::canopen_server::{Description, PdoDefault};
 
@@ -55,6 +56,26 @@ fn positive(counts: i64) -> Entry {
     both(Kind::U32, counts).bounded(Bounds::Between(1, i64::from(u32::MAX)))
 }
 
+/// A speed in the drive's own unit.
+fn speed(config: &Cia402DriveConfig, counts_per_s: i64) -> Entry {
+    let value = in_units(counts_per_s, config.quirks.counts_per_speed());
+    if !config.quirks.speeds_of_16_bits {
+        return positive(value);
+    }
+    let most = i64::from(u16::MAX);
+    both(Kind::U16, value.min(most)).bounded(Bounds::Between(1, most))
+}
+
+/// An acceleration in the drive's own unit.
+fn acceleration(config: &Cia402DriveConfig, counts_per_s2: i64) -> Entry {
+    let unit = config.quirks.counts_per_acceleration();
+    positive(in_units(counts_per_s2, unit))
+}
+
+fn in_units(counts: i64, unit: f64) -> i64 {
+    ((counts as f64 / unit).round() as i64).max(1)
+}
+
 fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     use Kind::{I8, U16, U32};
     let abort = i64::from(config.abort_connection_option);
@@ -68,9 +89,14 @@ fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     dictionary.insert(0x605C, 0, option(&[0, 1], 1));
     dictionary.insert(0x605D, 0, option(&[1, 2], 1));
     dictionary.insert(0x605E, 0, option(&[0, 1, 2], 2));
-    let mode = both(I8, 1).bounded(Bounds::OneOf(&[0, 1, 6, 8]));
-    dictionary.insert(0x6060, 0, mode);
-    let display = Entry::read_only(I8, 1).mapped(Mapping::Transmit);
+    let left = config.quirks.left_mode;
+    let modes: &[i64] = match left {
+        Some(3) => &[0, 1, 3, 6, 8],
+        _ => &[0, 1, 6, 8],
+    };
+    let mode = i64::from(left.unwrap_or(1));
+    dictionary.insert(0x6060, 0, both(I8, mode).bounded(Bounds::OneOf(modes)));
+    let display = Entry::read_only(I8, mode).mapped(Mapping::Transmit);
     dictionary.insert(0x6061, 0, display);
     dictionary.insert(0x6502, 0, Entry::constant(U32, SUPPORTED_MODES));
     dictionary.insert(0x60FD, 0, transmit(U32));
@@ -78,9 +104,15 @@ fn insert_control(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 
 fn insert_positions(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     use Kind::{I16, I32, U8, U16, U32};
-    for index in [0x6062, 0x6063, 0x6064, 0x606B, 0x606C, 0x60F4, 0x60FC] {
+    for index in [0x6062, 0x6063, 0x6064, 0x60F4, 0x60FC] {
         dictionary.insert(index, 0, transmit(I32));
     }
+    let speed = match config.quirks.speeds_of_16_bits {
+        true => I16,
+        false => I32,
+    };
+    dictionary.insert(0x606B, 0, transmit(speed));
+    dictionary.insert(0x606C, 0, transmit(speed));
     let power_on = config.power_on();
     dictionary.insert(0x6065, 0, both(U32, power_on.following_error_window));
     let timeout = i64::from(config.following_error_timeout_ms);
@@ -100,13 +132,15 @@ fn insert_positions(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
 fn insert_profile(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     use Kind::{I8, I32, U8};
     let power_on = config.power_on();
-    dictionary.insert(0x607F, 0, positive(power_on.max_velocity));
-    dictionary.insert(0x6081, 0, positive(power_on.velocity));
-    dictionary.insert(0x6083, 0, positive(power_on.acceleration));
-    dictionary.insert(0x6084, 0, positive(power_on.acceleration));
-    dictionary.insert(0x6085, 0, positive(power_on.quick_stop_deceleration));
+    dictionary.insert(0x607F, 0, speed(config, power_on.max_velocity));
+    dictionary.insert(0x6081, 0, speed(config, power_on.velocity));
+    dictionary.insert(0x6083, 0, acceleration(config, power_on.acceleration));
+    dictionary.insert(0x6084, 0, acceleration(config, power_on.acceleration));
+    let quick_stop = acceleration(config, power_on.quick_stop_deceleration);
+    dictionary.insert(0x6085, 0, quick_stop);
     dictionary.insert(0x6086, 0, option(&[0], 0));
-    dictionary.insert(0x60FF, 0, both(I32, 0));
+    let left = f64::from(config.quirks.left_velocity) / config.quirks.counts_per_speed();
+    dictionary.insert(0x60FF, 0, both(I32, left.round() as i64));
     let units = Entry::read_write(U8, 0);
     let exponent = Entry::read_write(I8, -3).bounded(Bounds::Between(-6, 0));
     dictionary.insert_array(0x60C2, vec![units, exponent]);
@@ -126,10 +160,11 @@ fn insert_homing(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
     let method = both(I8, 0).bounded(Bounds::OneOf(methods));
     dictionary.insert(0x6098, 0, method);
     let power_on = config.power_on();
-    let switch = positive(power_on.homing_switch_speed);
-    let zero = positive(power_on.homing_zero_speed);
+    let switch = speed(config, power_on.homing_switch_speed);
+    let zero = speed(config, power_on.homing_zero_speed);
     dictionary.insert_array(0x6099, vec![switch, zero]);
-    dictionary.insert(0x609A, 0, positive(power_on.homing_acceleration));
+    let homing = acceleration(config, power_on.homing_acceleration);
+    dictionary.insert(0x609A, 0, homing);
     let known = methods[1..].iter();
     let known = known.map(|method| Entry::constant(I8, *method));
     dictionary.insert_array(0x60E3, known.collect());
@@ -149,7 +184,32 @@ fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
         None => units(config.encoder_resolution_nm),
     };
     dictionary.insert(0x60A8, 0, Entry::read_write(U32, position));
-    dictionary.insert(0x60A9, 0, Entry::read_write(U32, velocity));
+    if config.quirks.speed_unit.is_none() {
+        dictionary.insert(0x60A9, 0, Entry::read_write(U32, velocity));
+    }
+    insert_unit_objects(dictionary, &config.quirks.unit_objects);
+}
+
+/// What the drive says of its units of speed and acceleration.
+fn insert_unit_objects(dictionary: &mut Dictionary, named: &UnitObjects) {
+    use Kind::{I8, U8, U32};
+    let objects = [
+        (0x60A9, U32, named.si_velocity.map(i64::from)),
+        (0x60AA, U32, named.si_acceleration.map(i64::from)),
+        (0x608B, I8, named.velocity_notation.map(i64::from)),
+        (0x608C, U8, named.velocity_dimension.map(i64::from)),
+        (0x608D, I8, named.acceleration_notation.map(i64::from)),
+        (0x608E, U8, named.acceleration_dimension.map(i64::from)),
+    ];
+    for (index, kind, value) in objects {
+        if let Some(value) = value {
+            dictionary.insert(index, 0, Entry::read_write(kind, value));
+        }
+    }
+    if let Some(factor) = named.velocity_factor {
+        let parts = factor.map(|part| Entry::read_write(U32, i64::from(part)));
+        dictionary.insert_array(0x6096, parts.to_vec());
+    }
 }
 
 /// 0x60A8 and 0x60A9 (CiA 303-2: prefix, numerator, denominator, 0): metre 0x01, second 0x03.
@@ -216,11 +276,18 @@ pub(super) fn description(config: &Cia402DriveConfig, node: NodeId) -> Descripti
     const NO_REMOTE: u32 = 1 << 30;
     let second = [(0x6060, 8), (0x607A, 32), (0x60FF, 32)];
     let receive = [Function::Rpdo2, Function::Rpdo3, Function::Rpdo4];
-    let mut rpdos = vec![pdo(node, Function::Rpdo1, 0, 0, 0x6040, None)];
+    let mut first = pdo(node, Function::Rpdo1, 0, 0, 0x6040, None);
+    first.event_timer_ms = config.quirks.rpdo_deadline_ms;
+    let mut rpdos = vec![first];
     for (function, extra) in receive.into_iter().zip(second) {
         rpdos.push(pdo(node, function, OFF, 0, 0x6040, Some(extra)));
     }
-    let second = [(0x6061, 8), (0x6064, 32), (0x606C, 32)];
+    let speed_bits = if config.quirks.speeds_of_16_bits {
+        16
+    } else {
+        32
+    };
+    let second = [(0x6061, 8), (0x6064, 32), (0x606C, speed_bits)];
     let transmit = [Function::Tpdo2, Function::Tpdo3, Function::Tpdo4];
     let mut tpdos = vec![pdo(node, Function::Tpdo1, NO_REMOTE, 10, 0x6041, None)];
     for (function, extra) in transmit.into_iter().zip(second) {

@@ -86,10 +86,10 @@ impl Drive {
     }
 
     /// 0x605D: 1 slows down on the profile's ramp, 2 on the quick stop's.
-    fn halt(&mut self, now: Time) {
+    pub(super) fn halt(&mut self, now: Time) {
         if self.is_moving_itself() {
             let option = self.get(0x605D);
-            let deceleration = self.get(if option == 2 { 0x6085 } else { 0x6084 });
+            let deceleration = self.acceleration(if option == 2 { 0x6085 } else { 0x6084 });
             self.ramp(now, deceleration, After::Stay);
         }
     }
@@ -102,6 +102,9 @@ impl Drive {
 
     /// A rising edge of bit 4; `false` when the set-point is not taken.
     fn take_set_point(&mut self, now: Time, new: Controlword, m: &mut impl Mechanism) -> bool {
+        if self.is_blocked_by_halt(new) {
+            return false;
+        }
         let immediately = new.contains(Controlword::MODE_5);
         let busy = self.positioning.current.is_some() && self.is_moving_itself();
         if busy && !immediately && self.positioning.buffer.is_some() {
@@ -126,22 +129,22 @@ impl Drive {
         true
     }
 
-    fn set_point(&self, relative: bool, m: &impl Mechanism) -> SetPoint {
-        let raw = self.get(0x607A);
+    fn set_point(&mut self, relative: bool, m: &impl Mechanism) -> SetPoint {
+        let raw = self.target_at_edge();
         let wanted = if relative {
             self.positioning.last_target + raw as f64
         } else {
             self.unwrapped(raw, m)
         };
         let target = self.within_soft_limits(wanted);
-        let velocity = self.get(0x6081).min(self.get(0x607F)) as f64;
+        let velocity = self.speed(0x6081, 0).min(self.speed(0x607F, 0));
         SetPoint {
             target,
             clipped: target != wanted,
             limits: MotionLimits {
                 velocity,
-                acceleration: self.get(0x6083) as f64,
-                deceleration: self.get(0x6084) as f64,
+                acceleration: self.acceleration(0x6083),
+                deceleration: self.acceleration(0x6084),
             },
         }
     }
@@ -161,6 +164,7 @@ impl Drive {
         self.profile = Profile::to_target(now, from, set_point.target, set_point.limits);
         self.activity = Activity::Positioning;
         self.moved_at = Some(now);
+        self.count_units();
         self.look_now();
         self.proceed(now, m);
     }

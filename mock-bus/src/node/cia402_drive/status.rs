@@ -8,7 +8,7 @@ use wire::cia402::{HomingStatus, Statusword};
 use super::mechanism::Mechanism;
 use super::motion::Activity;
 use super::power::Power;
-use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION};
+use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION, PROFILE_VELOCITY};
 
 impl Drive {
     /// Brings the process values in the dictionary up to date.
@@ -29,12 +29,14 @@ impl Drive {
             true => actual,
             false => m.counts() - self.counted_from,
         };
+        let unit = self.config.quirks.counts_per_speed();
+        let in_units = |speed: f64| (speed / unit).round() as i64;
         let values = [
             (0x6062, self.shown(shown)),
             (0x6063, increments),
             (0x6064, self.shown(actual)),
-            (0x606B, demand.velocity.round() as i64),
-            (0x606C, sign * m.speed().round() as i64),
+            (0x606B, in_units(demand.velocity)),
+            (0x606C, in_units(sign as f64 * m.speed())),
             (0x60F4, shown - actual),
             (0x60FC, sign * (shown - self.offset)),
             (0x60FD, inputs | interlock),
@@ -44,7 +46,9 @@ impl Drive {
         }
         let fault = self.fault.map_or(0, |code| i64::from(code.0));
         self.server.set(0x603F, 0, fault);
-        let status = self.statusword(now);
+        self.show_mode();
+        let polite = self.statusword(now);
+        let status = self.spoil_status(now, polite);
         self.show_status(now, i64::from(status.bits()));
     }
 
@@ -87,6 +91,7 @@ impl Drive {
                 status.set(Statusword::MODE_13, self.following_since.is_some());
                 status
             }
+            PROFILE_VELOCITY if enabled => status | Statusword::TARGET_REACHED,
             _ => {
                 let stopped = self.power == Power::QuickStopActive && self.profile.is_done(now);
                 status.set(Statusword::TARGET_REACHED, stopped);

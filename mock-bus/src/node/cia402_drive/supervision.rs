@@ -99,11 +99,14 @@ impl Drive {
             return;
         }
         let outward = self.is_limited(self.demand(now).velocity, m);
-        let planned = matches!(self.activity, Activity::Positioning | Activity::Cyclic);
+        let planned = matches!(
+            self.activity,
+            Activity::Positioning | Activity::Cyclic | Activity::Velocity
+        );
         if outward && planned {
             self.internal_limit = true;
             self.positioning.miss();
-            self.ramp(now, self.get(0x6085), After::Stay);
+            self.ramp(now, self.acceleration(0x6085), After::Stay);
             let (negative, _) = self.limits(m);
             let detail = [u8::from(!negative), 0, 0, 0, 0];
             self.server
@@ -183,7 +186,7 @@ impl Drive {
         }
         self.power = Power::FaultReactionActive;
         self.positioning.abandon();
-        let deceleration = self.get(if reaction == 2 { 0x6085 } else { 0x6084 });
+        let deceleration = self.acceleration(if reaction == 2 { 0x6085 } else { 0x6084 });
         self.ramp(now, deceleration, After::Off(Power::Fault));
     }
 

@@ -32,8 +32,9 @@ impl Drive {
         self.following_since = None;
         self.in_window_since = None;
         self.server.set(0x6040, 0, 0);
-        let mode = self.server.get(0x6060, 0);
-        self.server.set(0x6061, 0, mode);
+        self.mode = self.server.get(0x6060, 0);
+        self.remember_nothing();
+        self.show_mode();
         self.look_now();
     }
 

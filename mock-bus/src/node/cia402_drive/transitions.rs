@@ -8,7 +8,7 @@ use wire::cia402::Controlword;
 use super::mechanism::Mechanism;
 use super::motion::{Activity, After};
 use super::power::{Command, Power, Transition, transition};
-use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION};
+use super::{CYCLIC_POSITION, Drive, HOMING, PROFILE_POSITION, PROFILE_VELOCITY};
 
 impl Drive {
     pub(super) fn on_controlword(&mut self, now: Time, m: &mut impl Mechanism) {
@@ -21,7 +21,7 @@ impl Drive {
             self.reset_fault(now);
         }
         self.command = Some(Command::of(new));
-        self.keep_enabled();
+        self.keep_enabled(now, m);
         let before = self.power;
         self.pass_power(now, m);
         if before == Power::OperationEnabled && self.power == before {
@@ -29,6 +29,7 @@ impl Drive {
                 PROFILE_POSITION => self.control_positioning(now, old, new, m),
                 HOMING => self.control_homing(now, old, new, m),
                 CYCLIC_POSITION => self.control_cyclic(now, old, new),
+                PROFILE_VELOCITY => self.control_velocity(now, old, new),
                 _ => {}
             }
         }
@@ -39,12 +40,24 @@ impl Drive {
     }
 
     /// "Enable" during the ramp of a disable command: the drive stays enabled.
-    fn keep_enabled(&mut self) {
-        let leaving = matches!(self.activity, Activity::Ramp(After::Off(_)));
+    fn keep_enabled(&mut self, now: Time, m: &mut impl Mechanism) {
         let enable = self.command == Some(Command::EnableOperation);
-        if self.power == Power::OperationEnabled && leaving && enable {
-            self.activity = Activity::Ramp(After::Stay);
+        if self.power != Power::OperationEnabled || !enable {
+            return;
         }
+        match self.activity {
+            Activity::Ramp(After::Off(_)) => self.activity = Activity::Ramp(After::Stay),
+            Activity::Braking { .. } => self.open_brake(now, m),
+            _ => {}
+        }
+    }
+
+    /// Whether the drive is about to take the torque away.
+    const fn is_leaving(&self) -> bool {
+        matches!(
+            self.activity,
+            Activity::Ramp(After::Off(_)) | Activity::Braking { .. }
+        )
     }
 
     fn resumable(&self) -> bool {
@@ -67,7 +80,7 @@ impl Drive {
     /// The transition that waits for its time; `None` also where something forbids it.
     pub(super) fn pending_transition(&self) -> Option<Transition> {
         let wanted = self.wanted_transition()?;
-        let leaving = matches!(self.activity, Activity::Ramp(After::Off(_)));
+        let leaving = self.is_leaving();
         let forbidden = match wanted {
             Transition::T2 => self.safe_torque_off || self.internal_error.is_some(),
             Transition::T4 => self.config.quirks.enable_refused,
@@ -90,7 +103,14 @@ impl Drive {
             return;
         }
         self.count_refusal();
-        if let Some(transition) = self.pending_transition() {
+        let pending = self.pending_transition();
+        if pending.is_none() {
+            self.memory.enable_due = Time::NEVER;
+        }
+        if let Some(transition) = pending
+            && !self.is_enabling(now, transition)
+        {
+            self.memory.enable_due = Time::NEVER;
             self.perform(now, transition, m);
             self.power_free = now + Duration::from_millis(self.config.power_transition_ms);
         }
@@ -119,11 +139,11 @@ impl Drive {
     /// Options 0x605B and 0x605C: 0 lets the motor coast, 1 slows down first.
     fn leave(&mut self, now: Time, option: i64, to: Power, m: &mut impl Mechanism) {
         if option == 0 {
-            self.switch_off(m);
-            self.power = to;
+            self.positioning.abandon();
+            self.release(now, to, m);
         } else {
             self.positioning.abandon();
-            self.ramp(now, self.get(0x6084), After::Off(to));
+            self.ramp(now, self.acceleration(0x6084), After::Off(to));
         }
     }
 
@@ -135,7 +155,7 @@ impl Drive {
             self.power = Power::SwitchOnDisabled;
             return;
         }
-        let deceleration = self.get(if option == 1 || option == 5 {
+        let deceleration = self.acceleration(if option == 1 || option == 5 {
             0x6084
         } else {
             0x6085
@@ -158,5 +178,6 @@ impl Drive {
         if !self.profile.is_done(now) {
             self.activity = Activity::Ramp(After::Stay);
         }
+        self.run_at_speed(now);
     }
 }

@@ -74,6 +74,8 @@ pub struct MotionConfig {
     pub start_max_mm: f64,
     /// A power cycle moves the stage by up to this much either way.
     pub power_cycle_shift_um: f64,
+    /// What pulls at the stage while its drive is off; none where it lies flat.
+    pub weight: Option<WeightConfig>,
 }
 
 impl Default for MotionConfig {
@@ -90,6 +92,32 @@ impl Default for MotionConfig {
             start_min_mm: -1.5,
             start_max_mm: 1.5,
             power_cycle_shift_um: 200.0,
+            weight: None,
+        }
+    }
+}
+
+/// A weight, and the brake that holds it without torque.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WeightConfig {
+    /// The acceleration without torque and brake; negative towards the negative end.
+    pub gravity_m_per_s2: f64,
+    /// Whether there is a brake.
+    pub has_brake: bool,
+    /// From the drive's output, or the loss of torque, to the brake that holds.
+    pub brake_engage_ms: f64,
+    /// From the torque to the brake that is open.
+    pub brake_release_ms: f64,
+}
+
+impl Default for WeightConfig {
+    fn default() -> Self {
+        Self {
+            gravity_m_per_s2: -9.81,
+            has_brake: true,
+            brake_engage_ms: 30.0,
+            brake_release_ms: 50.0,
         }
     }
 }

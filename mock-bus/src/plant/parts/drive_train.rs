@@ -9,6 +9,7 @@ use super::limit_switch::LimitSwitch;
 use super::pulse::IndexPulse;
 use super::servo::Servo;
 use super::servo::{Mass, Stroke};
+use super::travel::{Travel, Travelled};
 
 /// Metres of a linear one, radians of a rotary one.
 #[derive(Clone, Debug)]
@@ -18,6 +19,8 @@ pub(in crate::plant) struct DriveTrain {
     pub(in crate::plant) index: Option<IndexMark>,
     /// The negative one and the positive one; what turns endlessly has no ends.
     pub(in crate::plant) switches: Option<[LimitSwitch; 2]>,
+    /// Where it was since a judge has marked it.
+    pub(in crate::plant) travelled: Travelled,
 }
 
 impl DriveTrain {
@@ -29,7 +32,24 @@ impl DriveTrain {
         {
             index.watch(from, to, &self.encoder);
         }
+        if let Some((from, to)) = stroke {
+            self.travelled.pass(from, to);
+        }
         stroke
+    }
+
+    /// A judge begins to watch.
+    pub(in crate::plant) fn mark(&mut self, now: Time) {
+        self.travelled = Travelled::from(self.mass.position_at(now));
+    }
+
+    /// Where it is, how fast, and where it was since it was marked.
+    pub(in crate::plant) fn travel(&self, now: Time) -> Travel {
+        Travel {
+            position: self.mass.position_at(now),
+            speed: self.mass.speed_at(now),
+            since_mark: self.travelled,
+        }
     }
 
     /// After the last step by `now`: the grid is skipped while the mass rests. Whether it does.

@@ -8,3 +8,5 @@ pub(super) mod index_mark;
 pub(super) mod limit_switch;
 pub(super) mod pulse;
 pub(super) mod servo;
+pub(super) mod travel;
+pub(super) mod weight;

@@ -7,11 +7,12 @@
 //! Places are metres of a linear axis and radians of a rotary one; the loop knows no difference.
 //!
 //! Absent: cogging, cable force, amplifier current and its limits beyond one largest
-//! acceleration.
+//! acceleration. A servo with torque carries the weight.
 
 use crate::random::Stream;
 use units::Time;
 
+use super::weight::Weight;
 use crate::plant::config::MotionConfig;
 
 /// How a servo drive acts on its axis.
@@ -25,6 +26,20 @@ pub enum Servo {
         /// axis, radians.
         demand: f64,
     },
+    /// The same, while the brake falls in.
+    Brake {
+        /// As above.
+        demand: f64,
+    },
+}
+
+impl Servo {
+    const fn demand(self) -> Option<f64> {
+        match self {
+            Self::Off => None,
+            Self::Follow { demand } | Self::Brake { demand } => Some(demand),
+        }
+    }
 }
 
 /// The servo samples and acts once in this time.
@@ -49,6 +64,8 @@ pub(in crate::plant) struct Dynamics {
     /// Nearer and slower than this the loop is taken to have settled.
     pub(in crate::plant) settled: f64,
     pub(in crate::plant) settled_speed: f64,
+    /// What pulls without torque.
+    pub(in crate::plant) weight: Weight,
 }
 
 impl From<MotionConfig> for Dynamics {
@@ -66,6 +83,7 @@ impl From<MotionConfig> for Dynamics {
             )),
             settled: 1e-9,
             settled_speed: 2e-6,
+            weight: config.weight.map_or(Weight::NONE, Weight::from),
         }
     }
 }
@@ -168,6 +186,8 @@ impl Mass {
     }
 
     pub(in crate::plant) fn set_servo(&mut self, now: Time, servo: Servo) {
+        let closed = !matches!(servo, Servo::Follow { .. });
+        self.dynamics.weight.ask_brake(now, closed);
         if servo == self.demand.servo && now > self.demand.at && self.resting {
             self.demand.at = now;
             self.demand.speed = 0.0;
@@ -189,9 +209,7 @@ impl Mass {
             at: now,
             period_s: 0.0,
         };
-        let (Servo::Follow { demand: before }, Servo::Follow { demand: after }) =
-            (old.servo, servo)
-        else {
+        let (Some(before), Some(after)) = (old.servo.demand(), servo.demand()) else {
             return standing;
         };
         if age == 0 {
@@ -253,9 +271,14 @@ impl Mass {
         } else {
             self.demand.servo
         };
+        let braked = self.dynamics.weight.is_braked(now);
         match servo {
+            _ if braked => self.brake(matches!(servo, Servo::Follow { .. })),
+            Servo::Off if self.dynamics.weight.acceleration != 0.0 => self.fall(),
             Servo::Off => self.coast(),
-            Servo::Follow { demand } => self.follow(now, demand + offset),
+            Servo::Follow { demand } | Servo::Brake { demand } => {
+                self.follow(now, demand + offset);
+            }
         }
         if self.blocked {
             self.acceleration = 0.0;
@@ -272,6 +295,37 @@ impl Mass {
         } else {
             self.acceleration = -friction * self.speed.signum();
         }
+    }
+
+    /// The brake holds, whatever the servo does; it will open again where that has torque.
+    fn brake(&mut self, opens: bool) {
+        let deceleration = self.dynamics.acceleration_max;
+        if self.speed.abs() <= deceleration * GRID_S {
+            self.speed = 0.0;
+            self.acceleration = 0.0;
+            self.resting = !opens;
+        } else {
+            self.acceleration = -deceleration * self.speed.signum();
+        }
+    }
+
+    /// The weight against the friction. At an end it rests.
+    fn fall(&mut self) {
+        let weight = self.dynamics.weight.acceleration;
+        let friction = self.dynamics.friction_deceleration;
+        let at_end = self.dynamics.hard_stops.is_some_and(|(low, high)| {
+            (weight < 0.0 && self.position <= low) || (weight > 0.0 && self.position >= high)
+        });
+        let slow = self.speed.abs() <= friction * GRID_S;
+        if slow && (at_end || weight.abs() <= friction) {
+            self.speed = 0.0;
+            self.acceleration = 0.0;
+            // A brake that still falls in has nothing to hold.
+            self.resting = true;
+            return;
+        }
+        let way = if slow { weight } else { self.speed };
+        self.acceleration = weight - friction * way.signum();
     }
 
     fn follow(&mut self, now: Time, demand: f64) {

@@ -165,6 +165,7 @@ impl ScrewConfig {
             start_min_mm: -self.start_mm,
             start_max_mm: self.start_mm,
             power_cycle_shift_um: self.power_cycle_shift_um,
+            weight: None,
         }
     }
 

@@ -45,6 +45,7 @@ impl Screw {
         play.lie_anywhere(start_m + error.at(start_m), &mut shift);
         let mut screw = Self {
             train: DriveTrain {
+                travelled: start_m.into(),
                 mass: Mass::new(config.motion(), start_m, stream("servo rest")),
                 encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
                 index: Some(IndexMark::new(

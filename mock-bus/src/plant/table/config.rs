@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use crate::config::error::{ConfigError, positive};
 use crate::plant::parts::servo::Dynamics;
+use crate::plant::parts::weight::Weight;
 
 const ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
 
@@ -109,6 +110,7 @@ impl TableMotionConfig {
             hard_stops: None,
             settled: 0.004 * ARCSEC,
             settled_speed: 4.0 * ARCSEC,
+            weight: Weight::NONE,
         }
     }
 }

@@ -78,6 +78,7 @@ impl Table {
         let repeatability = Radians::from_arcsec(encoder.index_repeatability_arcsec).value();
         Self {
             train: DriveTrain {
+                travelled: start.into(),
                 mass: Mass::new(
                     config.motion.dynamics(),
                     start,

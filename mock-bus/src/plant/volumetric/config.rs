@@ -4,7 +4,7 @@
 use serde::Deserialize;
 
 use crate::config::error::{ConfigError, positive};
-use crate::plant::config::{LimitConfig, MotionConfig};
+use crate::plant::config::{LimitConfig, MotionConfig, WeightConfig};
 
 /// Three linear axes, their errors, what warms them, and what watches them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,6 +21,8 @@ pub struct VolumetricConfig {
     pub resolution_nm: f64,
     /// What all slides have in common.
     pub slide: SlideConfig,
+    /// What pulls at the third axis while its drive is off; none where it is balanced.
+    pub weight_z: Option<WeightConfig>,
     /// Errors that are there from the beginning.
     pub errors: ErrorsConfig,
     /// What warms the machine, and what that does to it.
@@ -43,6 +45,7 @@ impl Default for VolumetricConfig {
             travel_mm: [500.0, 400.0, 300.0],
             resolution_nm: 10.0,
             slide: SlideConfig::default(),
+            weight_z: None,
             errors: ErrorsConfig::default(),
             heat: HeatConfig::default(),
             beams: BeamConfig::default(),
@@ -117,6 +120,7 @@ impl SlideConfig {
             start_min_mm: self.start_min_mm,
             start_max_mm: self.start_max_mm,
             power_cycle_shift_um: self.power_cycle_shift_um,
+            weight: None,
         }
     }
 

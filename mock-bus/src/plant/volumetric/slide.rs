@@ -3,6 +3,7 @@
 use units::Time;
 
 use super::config::VolumetricConfig;
+use crate::plant::config::MotionConfig;
 use crate::plant::parts::actuator::Actuator;
 use crate::plant::parts::drive_train::DriveTrain;
 use crate::plant::parts::encoder::Encoder;
@@ -10,6 +11,9 @@ use crate::plant::parts::index_mark::IndexMark;
 use crate::plant::parts::limit_switch::LimitSwitch;
 use crate::plant::parts::servo::Mass;
 use crate::random::Stream;
+
+/// The axis that a weight pulls at.
+const VERTICAL: usize = 2;
 
 #[derive(Clone, Debug)]
 pub(super) struct Slide {
@@ -24,11 +28,16 @@ impl Slide {
         let stream = |what: &str| Stream::new(seed, &format!("{whose}{what}"));
         let travel_mm = config.travel_mm[axis];
         let slide = &config.slide;
+        let motion = MotionConfig {
+            weight: config.weight_z.filter(|_| axis == VERTICAL),
+            ..slide.motion(travel_mm)
+        };
         let mut shift = stream("start position");
         let start_m = 1e-3 * shift.between(slide.start_min_mm, slide.start_max_mm);
         Self {
             train: DriveTrain {
-                mass: Mass::new(slide.motion(travel_mm), start_m, stream("servo rest")),
+                travelled: start_m.into(),
+                mass: Mass::new(motion, start_m, stream("servo rest")),
                 encoder: Encoder::new(config.resolution_nm * 1e-9, start_m),
                 index: Some(IndexMark::new(
                     slide.index_spacing_mm * 1e-3,

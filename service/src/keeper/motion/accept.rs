@@ -215,7 +215,7 @@ fn dead_man_of(request: &MoveRequest) -> Result<Option<Duration>, Problem> {
     }
 }
 
-fn speed_of(request: &MoveRequest) -> Result<Option<AxisSpeed>, Problem> {
+pub(super) fn speed_of(request: &MoveRequest) -> Result<Option<AxisSpeed>, Problem> {
     match request.speed {
         // Written so that NaN is refused too.
         Some(speed) if speed.0.value() > 0.0 => Ok(Some(speed.0)),

@@ -43,25 +43,83 @@ impl Keeper {
         self.require_running()?;
         let subject = self.subject(&request.axis)?;
         let going = self.jog_of(subject);
-        if let Some(number) = going
-            && self.motions.active[number].jog.as_ref() == Some(request)
-        {
-            let renewed = self.motions.active[number].id.to_string();
-            return self.renew(machine.now(), &renewed).map(|()| renewed);
-        }
         if request.speed.0.value() == 0.0 {
             return self.end_jog(machine, going, by, &request.axis);
+        }
+        if let Some(number) = going {
+            self.require_own(machine.now(), number, by)?;
+            let running = &self.motions.active[number];
+            if running.jog.as_ref() == Some(request) {
+                let renewed = running.id.to_string();
+                return self.renew(machine.now(), &renewed).map(|()| renewed);
+            }
+            self.require_one_hand(machine, number, by, request)?;
         }
         self.require_let_go(machine.now(), by, &request.axis)?;
         self.require_no_hands()?;
         let motion = self.jog_motion(machine, (id, by), request, subject)?;
         match going {
             // The other way, or at another speed: from rest.
-            Some(number) => self.stop_jog(machine, number, by),
+            Some(number) => self.replace_jog(machine, number, by),
             None => self.require_free_for(&motion)?,
         }
         self.queue(motion);
         Ok(id.to_owned())
+    }
+
+    /// Refuses a jog beside that of another caller, who need not let go for whoever asks later.
+    fn require_own(&self, now: Time, number: usize, by: &str) -> Result<(), Problem> {
+        let running = &self.motions.active[number];
+        // Only the holder of a lease gets here while there is one: others are refused before, and their jogs run out.
+        if running.by == by || self.holder(now).is_some() {
+            return Ok(());
+        }
+        let (axis, speed) = match &running.jog {
+            Some(jog) => (jog.axis.as_str(), jog.speed.0),
+            None => return Ok(()),
+        };
+        let what = format!(
+            "axis {axis} is jogged by {} at {speed:.3} since {} (motion {})",
+            running.by, running.accepted, running.id
+        );
+        let help = "wait until the key is let go of, or stop the machine; a lease keeps others from jogging";
+        Err(Problem::new(Code::AxisBusy, what, help))
+    }
+
+    /// Ends the jog `number` where `request` renews the one before it: two hands under one name hold two keys.
+    fn require_one_hand(
+        &mut self,
+        machine: &mut Machine,
+        number: usize,
+        by: &str,
+        request: &JogRequest,
+    ) -> Result<(), Problem> {
+        let now = machine.now();
+        self.motions.replaced.retain(|jog| now < jog.until);
+        let mut replaced = self.motions.replaced.iter();
+        if !replaced.any(|jog| jog.by == by && jog.request == *request) {
+            return Ok(());
+        }
+        self.stop_motion(machine, number, End::Stopped(stopped_by(by)));
+        let what = format!(
+            "jogs of axis {} at different speeds are asked for under the name {by} at one time; it is stopped",
+            request.axis
+        );
+        let help =
+            "let one client jog it, or give each a name of its own (the header Truestage-Client)";
+        Err(Problem::new(Code::AxisBusy, what, help))
+    }
+
+    /// Ends the jog `number` for the sake of another one by the same caller.
+    fn replace_jog(&mut self, machine: &mut Machine, number: usize, by: &str) {
+        if let Some(request) = self.motions.active[number].jog.clone() {
+            self.motions.replaced.push(Replaced {
+                request,
+                by: by.to_owned(),
+                until: machine.now() + LET_GO,
+            });
+        }
+        self.stop_jog(machine, number, by);
     }
 
     /// What `name` is: axes that never move by themselves are jogged by the parts of where they are together.
@@ -206,6 +264,14 @@ impl Keeper {
 #[derive(Debug)]
 pub(super) struct HeldBack {
     axis: String,
+    by: String,
+    until: Time,
+}
+
+/// A jog that gave way to another one of its caller, and until when a renewal of it is of a key that is still held.
+#[derive(Debug)]
+pub(super) struct Replaced {
+    request: JogRequest,
     by: String,
     until: Time,
 }

@@ -11,6 +11,7 @@ use units::{AxisSpeed, Time};
 
 use super::super::seat::{Seat, Task};
 use super::super::{Job, Keeper, Mode};
+use super::accept::speed_of;
 use super::going::other_unit;
 use super::{End, Motion, Phase, SETTLING};
 use crate::coordinate::Coordinate;
@@ -148,6 +149,7 @@ impl Keeper {
         }
         let grouped = &self.groups[first];
         refuse_options(request, &grouped.group)?;
+        let speed = speed_of(request)?;
         Ok(Some(Together {
             group: first,
             axes: grouped.axes.clone(),
@@ -157,6 +159,7 @@ impl Keeper {
                     uncompensated: request.uncompensated,
                     beyond: false,
                 },
+                speed,
                 align: request.align,
                 jog: None,
             },
@@ -317,7 +320,6 @@ fn settling(together: &Together, seats: &[Seat]) -> Duration {
 /// What a procedure has no use for.
 fn refuse_options(request: &MoveRequest, group: &Group) -> Result<(), Problem> {
     let given = [
-        ("speed", request.speed.is_some()),
         ("way", request.way.is_some()),
         ("approach", request.approach.is_some()),
         ("beyond", request.beyond),

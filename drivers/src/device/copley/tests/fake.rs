@@ -12,7 +12,7 @@ use wire::copley::{
 use wire::{LineControl, Payload};
 
 const REPLY: Duration = Duration::from_millis(2);
-/// Every move takes as long.
+/// Every move takes as long at least, so that none is faster than it was told.
 const TRAVEL: Duration = Duration::from_millis(200);
 
 /// What becomes of the next reply.
@@ -40,6 +40,13 @@ pub(super) struct Fake {
     pub(super) position: i64,
     commanded: i64,
     arrives: Option<Time>,
+    /// When and where the move under way began.
+    begun: (Time, i64),
+    /// Moves are so many times as fast as they are told.
+    pub(super) hurry: f64,
+    /// Homing keeps the bits of the homing before, and does nothing, until then.
+    pub(super) stale_until: Option<Duration>,
+    homes: Option<Time>,
     replies: VecDeque<(Time, Vec<u8>)>,
     /// Applied to the next reply to a line that contains the text.
     pub(super) spoils: VecDeque<(&'static str, Spoil)>,
@@ -59,6 +66,10 @@ impl Fake {
             position: 0,
             commanded: 0,
             arrives: None,
+            begun: (Time::ZERO, 0),
+            hurry: 1.0,
+            stale_until: None,
+            homes: None,
             replies: VecDeque::new(),
             spoils: VecDeque::new(),
         }
@@ -82,10 +93,16 @@ impl Fake {
 
     pub(super) fn next_event(&self) -> Time {
         let reply = self.replies.front().map_or(Time::NEVER, |(at, _)| *at);
-        reply.min(self.arrives.unwrap_or(Time::NEVER))
+        let homes = self.homes.unwrap_or(Time::NEVER);
+        reply.min(self.arrives.unwrap_or(Time::NEVER)).min(homes)
     }
 
     pub(super) fn poll(&mut self, now: Time) -> Option<Vec<u8>> {
+        if self.homes.is_some_and(|at| at <= now) {
+            self.homes = None;
+            self.home(now);
+        }
+        self.advance(now);
         if self.arrives.is_some_and(|at| at <= now) {
             self.arrives = None;
             self.position = self.commanded;
@@ -96,6 +113,34 @@ impl Fake {
             return None;
         }
         self.replies.pop_front().map(|(_, reply)| reply)
+    }
+
+    /// Where a move under way has taken it.
+    fn advance(&mut self, now: Time) {
+        let Some(arrives) = self.arrives else { return };
+        let (since, from) = self.begun;
+        let whole = arrives.since(since).as_secs_f64();
+        let share = (now.since(since).as_secs_f64() / whole).min(1.0);
+        self.position = from + ((self.commanded - from) as f64 * share) as i64;
+    }
+
+    fn travel(&self) -> Duration {
+        let way = (self.commanded - self.position).abs() as f64;
+        let speed = self.ram[&Parameter::SPEED.0] as f64 / 10.0;
+        let seconds = way / speed / self.hurry;
+        Duration::from_secs_f64(seconds.max(TRAVEL.as_secs_f64() / self.hurry))
+    }
+
+    fn home(&mut self, now: Time) {
+        let method = self.ram[&Parameter::HOMING_METHOD.0];
+        (self.position, self.commanded) = (0, 0);
+        if HomingMethod::from_raw(method) != HomingMethod::Here {
+            self.begun = (now, 0);
+            self.arrives = Some(now + TRAVEL);
+            self.events.insert(EventStatus::IN_MOTION);
+            self.trajectory.insert(TrajectoryStatus::RUNNING);
+        }
+        self.trajectory.insert(TrajectoryStatus::REFERENCED);
     }
 
     pub(super) fn hear(&mut self, now: Time, payload: &Payload) {
@@ -159,7 +204,8 @@ impl Fake {
             Command::Trajectory(Trajectory::Move) => {
                 if !self.events.contains(EventStatus::OUTPUTS_OFF) {
                     self.commanded = self.ram[&Parameter::POSITION_COMMAND.0];
-                    self.arrives = Some(now + TRAVEL);
+                    self.begun = (now, self.position);
+                    self.arrives = Some(now + self.travel());
                     self.events.insert(EventStatus::IN_MOTION);
                     self.trajectory.insert(TrajectoryStatus::RUNNING);
                     self.trajectory.remove(TrajectoryStatus::ABORTED);
@@ -167,8 +213,8 @@ impl Fake {
                 Reply::Ok
             }
             Command::Trajectory(Trajectory::Abort) => {
+                self.advance(now);
                 if self.arrives.take().is_some() {
-                    self.position = (self.position + self.commanded) / 2;
                     self.commanded = self.position;
                     self.events.remove(EventStatus::IN_MOTION);
                     self.trajectory.remove(TrajectoryStatus::RUNNING);
@@ -177,15 +223,11 @@ impl Fake {
                 Reply::Ok
             }
             Command::Trajectory(Trajectory::Home) => {
-                let method = self.ram[&Parameter::HOMING_METHOD.0];
                 assert_eq!(self.ram[&Parameter::HOME_OFFSET.0], 0, "it would move");
-                if HomingMethod::from_raw(method) != HomingMethod::Here {
-                    self.arrives = Some(now + TRAVEL);
-                    self.events.insert(EventStatus::IN_MOTION);
-                    self.trajectory.insert(TrajectoryStatus::RUNNING);
+                match self.stale_until {
+                    Some(stale) => self.homes = Some(now + stale),
+                    None => self.home(now),
                 }
-                (self.position, self.commanded) = (0, 0);
-                self.trajectory.insert(TrajectoryStatus::REFERENCED);
                 Reply::Ok
             }
             Command::Reset => Reply::Ok,

@@ -859,3 +859,89 @@ proptest! {
         prop_assert_eq!(rig.axis.poll_outcome(), None);
     }
 }
+
+const INDEX: AxisCommand = AxisCommand::HomeIndex {
+    position: Metres(0.0),
+    speed: MetresPerSecond(0.005),
+};
+
+#[test]
+fn bits_of_a_homing_before_are_not_believed() {
+    let mut rig = Rig::enabled();
+    rig.does(INDEX).unwrap();
+    rig.does(to(3.0)).unwrap();
+    rig.fake.stale_until = Some(MS * 250);
+    rig.does(INDEX).unwrap();
+    assert!(rig.axis.is_homed());
+    assert_eq!(rig.fake.position, 0, "it was homed again");
+    assert_eq!(rig.alarms, []);
+}
+
+#[test]
+fn a_homing_that_never_begins_is_not_believed() {
+    let timeouts = CopleyTimeouts {
+        homing: Duration::from_secs(5),
+        ..CopleyTimeouts::default()
+    };
+    let mut rig = Rig::with(CopleySettings {
+        timeouts,
+        ..settings()
+    });
+    rig.start().unwrap();
+    rig.does(DriveCommand::Enable).unwrap();
+    rig.does(INDEX).unwrap();
+    rig.does(to(3.0)).unwrap();
+    rig.fake.stale_until = Some(Duration::from_secs(3600));
+    let failed = rig.does(INDEX).unwrap_err();
+    assert!(matches!(failed, DeviceError::Timeout { .. }), "{failed}");
+    assert!(!rig.axis.is_homed());
+}
+
+#[test]
+fn a_motion_in_another_unit_of_speed_is_stopped() {
+    let mut rig = Rig::enabled();
+    rig.fake.hurry = 5.0;
+    let failed = rig.does(to(9.0)).unwrap_err();
+    assert!(matches!(failed, DeviceError::Alarmed { .. }), "{failed}");
+    let [Alarm::TooFast { seen, limit, .. }] = rig.alarms[..] else {
+        panic!("{:?}", rig.alarms)
+    };
+    assert!(seen.value() > 1.5 * limit.value(), "{seen} of {limit}");
+    rig.live(MS * 500);
+    assert_eq!(rig.count("2 t 0"), 1);
+    assert!(rig.fake.position < 500_000, "{}", rig.fake.position);
+    assert!(rig.fake.events.contains(EventStatus::OUTPUTS_OFF));
+    assert!(
+        rig.axis.poll_outcome().is_none(),
+        "nobody asked for the stop"
+    );
+}
+
+#[test]
+fn an_axis_that_leaves_its_place_is_stopped() {
+    let mut rig = Rig::enabled();
+    rig.does(to(3.0)).unwrap();
+    rig.fake.position += 400;
+    rig.live(MS * 100);
+    assert_eq!(rig.alarms, [], "within the hold limit");
+    rig.fake.position += 4_000;
+    rig.live(MS * 500);
+    let [Alarm::OutsideEnvelope { .. }] = rig.alarms[..] else {
+        panic!("{:?}", rig.alarms)
+    };
+    assert!(rig.fake.events.contains(EventStatus::OUTPUTS_OFF));
+}
+
+#[test]
+fn enabling_an_axis_that_moves_ends_its_move() {
+    let mut rig = Rig::enabled();
+    rig.axis.command(rig.now, to(9.0));
+    rig.live(MS * 300);
+    assert!(rig.fake.arrives().is_some(), "it moves");
+    rig.does(DriveCommand::Enable).unwrap();
+    assert!(rig.fake.arrives().is_none());
+    let stands = rig.fake.position;
+    rig.live(MS * 1000);
+    assert_eq!(rig.fake.position, stands);
+    assert_eq!(rig.alarms, []);
+}

@@ -1,6 +1,7 @@
 //! The node's dialogs, byte by byte.
 
 mod blocks;
+mod habits;
 mod impolite;
 mod management;
 mod process;
@@ -13,7 +14,9 @@ use wire::can::{CanFrame, CanId};
 use wire::canopen::pdo::MappedObject;
 
 use super::dictionary::{Access, Bounds, Entry, Kind, Mapping};
-use super::{CanopenServer, Description, Dictionary, Identity, Manners, PdoDefault, ServerEvent};
+use super::{
+    CanopenServer, Description, Dictionary, Identity, Manners, NamedObject, PdoDefault, ServerEvent,
+};
 use wire::canopen::NodeId;
 
 pub(super) const LOG: usize = 300;

@@ -145,6 +145,54 @@ fn enabling_again_during_that_ramp_keeps_the_drive_enabled() {
     assert_eq!(bench.status() & 0x6F, 0x27);
 }
 
+fn braked() -> Bench {
+    let mut bench = Bench::with(Cia402DriveConfig {
+        brake_engage_ms: 30,
+        ..Cia402DriveConfig::default()
+    });
+    bench.enable();
+    bench
+}
+
+#[track_caller]
+fn check_brake_first(controlword: u16, state: u16) {
+    let mut bench = braked();
+    bench.control(controlword);
+    let _ = bench.wait_ms(29);
+    assert!(matches!(bench.axis.servo, Servo::Brake { .. }));
+    assert_eq!(bench.status() & 0x6F, 0x27);
+    let _ = bench.wait_ms(2);
+    assert_eq!(bench.axis.servo, Servo::Off);
+    assert_eq!(bench.status() & 0x6F, state);
+}
+
+#[test]
+fn the_brake_falls_in_before_the_torque_goes() {
+    check_brake_first(0x07, 0x23);
+    check_brake_first(0x06, 0x21);
+    let mut bench = braked();
+    bench.control(0x00);
+    assert_eq!(
+        bench.axis.servo,
+        Servo::Off,
+        "disable voltage lets go at once"
+    );
+}
+
+#[test]
+fn enabling_while_the_brake_falls_in_opens_it() {
+    let mut bench = braked();
+    bench.control(0x06);
+    let _ = bench.wait_ms(10);
+    bench.control(0x0F);
+    assert!(matches!(bench.axis.servo, Servo::Follow { .. }));
+    let _ = bench.wait_ms(100);
+    assert_eq!(bench.status() & 0x6F, 0x27);
+    bench.set_point(100_000, 0);
+    let _ = bench.wait_ms(1000);
+    assert_eq!(bench.axis.counts, 100_000);
+}
+
 #[test]
 fn quick_stop_option_6_stops_and_stays_until_told_otherwise() {
     let mut bench = Bench::new();
