@@ -3,6 +3,7 @@
 
 mod certified;
 mod gantry;
+mod gravity;
 mod histories;
 mod job;
 mod kept_reference;

@@ -50,6 +50,23 @@ const fn stops(goal: Goal) -> bool {
     }
 }
 
+/// `step` for an axis that gravity pulls. Quick stop active gives torque: no command that lets go
+/// ends that, only operation enabled again (transition 16).
+const fn held_up(goal: Goal, state: PowerState, step: PowerStep, standing: bool) -> PowerStep {
+    match (goal, state) {
+        (Goal::OperationEnabled, PowerState::QuickStopActive) => {
+            PowerStep::Command(Controlword::ENABLE_COMMAND)
+        }
+        (Goal::SwitchOnDisabled | Goal::QuickStop, PowerState::QuickStopActive) if standing => {
+            PowerStep::Done(Controlword::QUICK_STOP_COMMAND)
+        }
+        (Goal::SwitchOnDisabled, PowerState::QuickStopActive) => {
+            PowerStep::Command(Controlword::QUICK_STOP_COMMAND)
+        }
+        _ => step,
+    }
+}
+
 impl<Q: Coordinate> Cia402Drive<Q> {
     /// An axis that is enabled stays as it is: nothing is sent that could set an old target free.
     pub(super) fn begin_enable(&mut self, now: Time, was_moving: bool) {
@@ -142,7 +159,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         let (since, then, timeout) = (power.since, power.then, power.poll_timeout());
         // Stopped is what the drive says after it has had the command, not what it said before.
         let fresh = sample.at.since(since) >= self.settings.common.sync_period * 2;
-        match power.sequence.next(now, status, standing) {
+        let step = power.sequence.next(now, status, standing);
+        let step = match self.settings.gravity {
+            true => held_up(goal, status.state(), step, standing),
+            false => step,
+        };
+        match step {
             PowerStep::Command(Controlword::ENABLE_COMMAND) if runs_by_itself => {
                 self.await_mode_while_off(now, since, mode);
             }

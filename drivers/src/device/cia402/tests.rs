@@ -149,6 +149,7 @@ impl FakeDrive {
         self.state = match (self.state, control & 0x0F) {
             (_, word) if word & 0x02 == 0 => 0x40,
             (0x27, _) if quick_stop => 0x07,
+            (0x07, 0x0F) if self.stays_in_quick_stop => 0x27,
             (0x07, _) => 0x07,
             (_, _) if quick_stop => 0x40,
             (_, 0x06) => 0x21,
@@ -410,6 +411,29 @@ fn a_drive_that_somebody_left_in_motion_is_stopped_by_the_start() {
         // As good as one that was off.
         assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
     }
+}
+
+#[test]
+fn an_axis_that_gravity_pulls_is_never_let_go() {
+    let mut rig = Rig::with(Cia402Settings {
+        gravity: true,
+        ..settings()
+    });
+    rig.fake.stays_in_quick_stop = true;
+    rig.start().unwrap();
+    rig.does(DriveCommand::Enable).unwrap();
+    rig.sent.clear();
+    assert_eq!(rig.does(DriveCommand::QuickStop), Ok(()));
+    assert_eq!(rig.does(DriveCommand::Disable), Ok(()));
+    assert_eq!(rig.fake.state, 0x07, "quick stop active");
+    assert_eq!(rig.does(DriveCommand::Enable), Ok(()));
+    assert_eq!(rig.fake.state, 0x27);
+    let lets_go = |word: &String| word.starts_with("00") || word.starts_with("04");
+    let words = rig.controlwords();
+    assert!(!words.iter().any(lets_go), "{words:?}");
+    // Out of operation enabled the drive closes its brake itself.
+    assert_eq!(rig.does(DriveCommand::Disable), Ok(()));
+    assert_eq!(rig.fake.state, 0x40);
 }
 
 /// CiA 301, 7.5.2.38: off, no mapping, map, count, type, on.
