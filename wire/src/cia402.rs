@@ -396,6 +396,43 @@ impl fmt::Display for NamedStatus {
     }
 }
 
+/// A unit as CiA 303-2 codes one: prefix, numerator, denominator, in the bytes from the highest down.
+///
+/// # Example
+///
+/// ```
+/// use wire::cia402::UnitCode;
+///
+/// assert_eq!(UnitCode(0x00B4_4700).to_string(), "turns/min, 0x00B44700");
+/// assert_eq!(UnitCode(0xFD01_0300).to_string(), "1e-3 m/s, 0xFD010300");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnitCode(pub u32);
+
+impl fmt::Display for UnitCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [_, per, what, prefix] = self.0.to_le_bytes();
+        let name = |code| match code {
+            0x01 => Some("m"),
+            0x03 => Some("s"),
+            0x10 => Some("rad"),
+            0x41 => Some("deg"),
+            0x47 => Some("min"),
+            0xB4 => Some("turns"),
+            0xB5 => Some("increments"),
+            0xC0 => Some("turns/min"),
+            _ => None,
+        };
+        if let (Some(what), Some(per)) = (name(what), name(per)) {
+            match prefix.cast_signed() {
+                0 => write!(f, "{what}/{per}, ")?,
+                exponent => write!(f, "1e{exponent} {what}/{per}, ")?,
+            }
+        }
+        write!(f, "{:#010X}", self.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,7 +7,7 @@ use units::{LengthOrAngle, Short};
 use wire::canopen::nmt::NmtState;
 use wire::canopen::sdo::AbortCode;
 use wire::canopen::{NodeId, Object};
-use wire::cia402::{NamedStatus, PowerState};
+use wire::cia402::{NamedStatus, PowerState, UnitCode};
 use wire::copley::{ErrorCode, EventStatus, Faults, Parameter};
 
 use super::{Alarm, DeviceName};
@@ -88,6 +88,29 @@ pub enum DeviceError {
         object: Object,
         expected: f64,
         seen: f64,
+    },
+    /// The drive counts speed or acceleration in another unit than the position's.
+    #[error(
+        "{node}, {object}: the drive counts {what} in another unit ({seen}) than its position units \
+         per second; set {object} to those, or use a drive that has them: nothing was moved"
+    )]
+    WrongUnit {
+        node: NodeId,
+        object: Object,
+        what: &'static str,
+        seen: UnitCode,
+    },
+    /// The drive turns speeds or accelerations into units of its own.
+    #[error(
+        "{node}, {object}: the drive multiplies {what} by {above}/{below}; set both parts to 1, so \
+         that {what} counts in position units: nothing was moved"
+    )]
+    WrongFactor {
+        node: NodeId,
+        object: Object,
+        what: &'static str,
+        above: u32,
+        below: u32,
     },
     /// Something that was awaited did not come.
     #[error("{device}: waited {} for {awaited}, last saw {seen}", units::ShortSpan(*waited))]

@@ -81,6 +81,8 @@ pub enum Presence {
     Required,
     /// Its absence is noted.
     Optional,
+    /// Whatever the server answers in place of a value is taken for its absence.
+    Informative,
 }
 
 /// One step of a script.
@@ -141,6 +143,14 @@ impl Step {
     #[must_use]
     pub const fn optional(mut self) -> Self {
         self.presence = Presence::Optional;
+        self
+    }
+
+    /// The same step for an object that only informs: some servers abort with codes of their own
+    /// where an object is missing.
+    #[must_use]
+    pub const fn informative(mut self) -> Self {
+        self.presence = Presence::Informative;
         self
     }
 }
@@ -303,7 +313,7 @@ impl Script {
     ) -> Result<(), ScriptCause> {
         let data = match outcome {
             Ok(data) => data,
-            Err(failure) if step.presence == Presence::Optional && is_absence(&failure) => {
+            Err(failure) if is_noted(step.presence, &failure) => {
                 self.done();
                 return Ok(());
             }
@@ -331,6 +341,15 @@ impl Script {
     fn done(&mut self) {
         self.steps.pop_front();
         self.phase = Phase::Ready;
+    }
+}
+
+/// Whether a step without its object is passed over.
+fn is_noted(presence: Presence, failure: &SdoFailure) -> bool {
+    match presence {
+        Presence::Required => false,
+        Presence::Optional => is_absence(failure),
+        Presence::Informative => matches!(failure, SdoFailure::Aborted { .. }),
     }
 }
 

@@ -20,6 +20,7 @@ mod commands;
 mod convert;
 mod course;
 mod cyclic;
+mod drive_units;
 mod events;
 mod halt;
 mod homing;

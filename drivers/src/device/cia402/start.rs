@@ -7,8 +7,8 @@ use wire::canopen::pdo::{MappedObject, Transmission};
 use wire::cia402::OperationMode;
 
 use super::convert::{acceleration_counts, counts_i32, distance_counts, velocity_counts};
-use super::latch;
 use super::settings::{Cia402Settings, PositionRange};
+use super::{drive_units, latch};
 use crate::device::canopen_node::millis;
 use crate::device::{DeviceError, ReferenceProof};
 use crate::protocol::pdo_setup::{Pdo, PdoDirection, PdoTooLong};
@@ -52,6 +52,7 @@ pub(super) fn description<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Vec<St
         FEED_REVOLUTIONS,
     ];
     steps.extend(factors.map(|object| Step::read(object, FACTORS).optional()));
+    steps.extend(drive_units::description());
     steps.extend(latch::description(settings));
     steps
 }
@@ -79,6 +80,7 @@ pub(super) fn check_description<Q: Coordinate>(
             });
         }
     }
+    drive_units::check(node, script)?;
     let Some(increment) = settings.increment else {
         return Ok(());
     };
