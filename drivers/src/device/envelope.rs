@@ -28,6 +28,8 @@ const JUDGED_OVER: Duration = Duration::from_millis(50);
 const SPEED_MARGIN: f64 = 1.1;
 /// A drive brakes later and softer than a calculation says.
 const STOPPING_MARGIN: f64 = 1.5;
+/// An axis is where it shall stand once so many samples lie there.
+const QUIET_SAMPLES: u8 = 3;
 /// From a command to the first sample that shows its effect, in SYNC periods.
 const REACTION_PERIODS: u32 = 4;
 /// Beside the bus, the drive takes its own time.
@@ -71,6 +73,7 @@ enum Request {
     Arriving {
         room: i64,
         near: Option<i64>,
+        samples: u8,
     },
     Hold {
         place: i64,
@@ -122,16 +125,22 @@ impl Envelope {
         self.request = Request::Free;
     }
 
-    /// The drive is enabled: the axis holds where the next sample shows it.
-    pub(super) const fn take_hold(&mut self) {
-        let room = self.figures.hold_limit;
-        self.request = Request::Arriving { room, near: None };
+    /// The drive is enabled: the axis holds where it was before, `near` that place.
+    pub(super) const fn take_hold(&mut self, near: Option<i64>) {
+        self.request = Request::Arriving {
+            room: self.figures.hold_limit,
+            near,
+            samples: 0,
+        };
     }
 
     /// A motion is over: the axis settles where the next sample shows it.
     pub(super) const fn settle(&mut self) {
-        let room = self.figures.lag;
-        self.request = Request::Arriving { room, near: None };
+        self.request = Request::Arriving {
+            room: self.figures.lag,
+            near: None,
+            samples: 0,
+        };
     }
 
     /// The axis stands at `position`: what settled has its place there, and what stopped, once
@@ -215,10 +224,8 @@ impl Envelope {
     pub(super) const fn is_in_place(&self, position: i64) -> bool {
         match self.request {
             Request::Hold { place } => (position - place).abs() <= self.figures.window,
-            Request::Within { .. }
-            | Request::Follow { .. }
-            | Request::Free
-            | Request::Arriving { .. } => true,
+            Request::Arriving { samples, .. } => samples >= QUIET_SAMPLES,
+            Request::Within { .. } | Request::Follow { .. } | Request::Free => true,
         }
     }
 
@@ -233,11 +240,16 @@ impl Envelope {
         let sample = Point { at, position };
         let (asked, (low, high), profile) = match self.request {
             Request::Free => return None,
-            Request::Arriving { room, near } => {
+            Request::Arriving {
+                room,
+                near,
+                samples,
+            } => {
                 let near = near.unwrap_or(position);
                 self.request = Request::Arriving {
                     room,
                     near: Some(near),
+                    samples: samples.saturating_add(1),
                 };
                 (Asked::Hold, around(near, room), None)
             }
@@ -409,7 +421,7 @@ mod tests {
     #[test]
     fn an_axis_that_leaves_its_place_departs() {
         let mut envelope = envelope();
-        envelope.take_hold();
+        envelope.take_hold(None);
         assert_eq!(judge(&mut envelope, [1000.0, 1050.0].into_iter()), None);
         envelope.stand(1000, true);
         assert!(envelope.is_in_place(1005) && !envelope.is_in_place(1006));

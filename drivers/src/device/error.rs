@@ -137,6 +137,12 @@ pub enum DeviceError {
         expected: i8,
         seen: i8,
     },
+    /// A quick stop had no effect; the drive was switched off while its axis moved.
+    #[error(
+        "{device}: the quick stop had no effect, and the drive was switched off in motion: the axis \
+         coasts; set what a quick stop does (0x605A) and its deceleration (0x6085)"
+    )]
+    NoQuickStop { device: DeviceName },
     /// A homing was called done, and the place shown has not become the home coordinate.
     #[error(
         "{node}: not homed, the drive calls homing attained, but shows {shown:.3} in place of \

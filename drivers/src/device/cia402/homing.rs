@@ -46,8 +46,8 @@ pub(super) struct Homing {
     phase: Phase,
     /// The coordinate at home, in counts.
     position: i64,
-    /// How far from there the axis may stand afterwards.
-    beside: i64,
+    /// How far from there the axis may stand afterwards, with falling and with growing counts.
+    beside: (i64, i64),
     /// The search, in counts per second and per second squared; `None`: homed where it stands.
     search: Option<Profile>,
     since: Time,
@@ -87,6 +87,11 @@ impl<S: Copy> HomingPlace<S> {
             (Self::NextIndex(_, Reverse), false) | (Self::NextIndex(_, Forward), true) => 33,
             (Self::NextIndex(_, Forward), false) | (Self::NextIndex(_, Reverse), true) => 34,
         }
+    }
+
+    /// Which way the axis goes when its home is found: off the negative switch, or as asked.
+    const fn ends_forward(&self) -> bool {
+        !matches!(self, Self::NextIndex(_, Approach::Reverse))
     }
 
     const fn speed(&self) -> Option<S> {
@@ -131,7 +136,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.activity = Activity::Homing(Homing {
                     phase: Phase::Preparing,
                     position,
-                    beside: self.beside_home(search),
+                    beside: self.beside_home(search, place.ends_forward()),
                     search,
                     since: now,
                     deadline: Time::NEVER,
@@ -389,15 +394,26 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
-    /// How far from home the axis may stand after a homing.
-    fn beside_home(&self, search: Option<Profile>) -> i64 {
+    /// How far from home the axis may stand after a homing: it stops behind the place where its home
+    /// was found.
+    fn beside_home(&self, search: Option<Profile>, is_forward: bool) -> (i64, i64) {
         let tolerance = self.settings.tolerance_counts();
-        search.map_or(tolerance, |profile| {
-            let way = self
-                .envelope
-                .stopping_way(profile.speed, profile.acceleration);
-            way as i64 + self.settings.figures().lag
-        })
+        let Some(Profile {
+            speed,
+            acceleration,
+        }) = search
+        else {
+            return (tolerance, tolerance);
+        };
+        let samples = (self.settings.common.sync_period * 2).as_secs_f64();
+        let way = speed * speed / (2.0 * acceleration.max(1.0)) + speed * samples;
+        let lag = self.settings.figures().lag;
+        let behind = way as i64 + lag;
+        let counts_forward = is_forward == (self.settings.scale.resolution() > Q::ZERO);
+        match counts_forward {
+            true => (lag, behind),
+            false => (behind, lag),
+        }
     }
 
     /// Whether the place shown is the home coordinate, as far as the axis stands beside its home.
@@ -406,7 +422,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             return false;
         };
         let modulo = self.settings.modulo();
-        apart(modulo, position, homing.position).abs() <= homing.beside
+        let away = apart(modulo, position, homing.position);
+        (-homing.beside.0..=homing.beside.1).contains(&away)
     }
 
     pub(super) fn homing_timeout(&mut self, now: Time) {

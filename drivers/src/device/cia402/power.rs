@@ -1,10 +1,13 @@
 //! Enable, disable, quick stop and fault reset of a drive.
 
+use core::time::Duration;
+
 use units::{Coordinate, Time};
 use wire::cia402::{Controlword, OperationMode, PowerState};
 
 use super::start::CONTROLWORD;
 use super::{Activity, Cia402Drive};
+use crate::device::envelope::Point;
 use crate::device::{DeviceError, Seen};
 use crate::protocol::power_state::{Goal, PowerFailure, PowerSequence, PowerStep};
 use crate::protocol::script::Step;
@@ -15,7 +18,27 @@ pub(super) struct Power {
     sequence: PowerSequence,
     then: Then,
     since: Time,
+    /// Where the axis was before it was enabled.
+    before: Option<i64>,
+    braking: Braking,
 }
+
+/// How an axis slows down in a quick stop.
+#[derive(Clone, Copy, Debug, Default)]
+struct Braking {
+    mark: Option<Point>,
+    /// Counts of the span before.
+    moved: Option<i64>,
+    /// So many spans in a row it was as fast as before.
+    unslowed: u8,
+    /// The quick stop has no effect: the drive lets go.
+    lets_go: bool,
+}
+
+/// A span over which the speed of a quick stop is judged.
+const BRAKING_SPAN: Duration = Duration::from_millis(80);
+/// After so many spans without effect nothing else is left.
+const UNSLOWED_MAX: u8 = 2;
 
 impl Power {
     pub(super) fn poll_timeout(&self) -> Time {
@@ -32,6 +55,27 @@ enum Then {
     Enable,
     /// Nothing: no command asked for the change.
     BeSilent,
+}
+
+impl Braking {
+    /// Whether the axis goes on as fast as before: a drive that brakes too softly slows down at least.
+    fn lets_go(&mut self, here: Point, window: i64) -> bool {
+        let mark = *self.mark.get_or_insert(here);
+        if !self.lets_go && here.at.since(mark.at) >= BRAKING_SPAN {
+            let span = here.at.since(mark.at).as_secs_f64() / BRAKING_SPAN.as_secs_f64();
+            let moved = ((here.position - mark.position).abs() as f64 / span) as i64;
+            let is_as_fast = self
+                .moved
+                .is_some_and(|before| moved > before - before / 10);
+            self.unslowed = match is_as_fast && moved > window * 4 {
+                true => self.unslowed + 1,
+                false => 0,
+            };
+            (self.mark, self.moved) = (Some(here), Some(moved));
+            self.lets_go = self.unslowed >= UNSLOWED_MAX;
+        }
+        self.lets_go
+    }
 }
 
 const fn step_name(goal: Goal) -> &'static str {
@@ -126,6 +170,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             sequence,
             then,
             since: now,
+            before: None,
+            braking: Braking::default(),
         });
         // Everything else waits for the next statusword: the last one may be out of date.
         if let Some(control) = first {
@@ -148,6 +194,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     pub(super) fn advance_power(&mut self, now: Time) {
         let standing = self.image.plausible.stands();
+        let here = self.image.here();
+        let (window, is_late) = (self.settings.tolerance_counts(), self.mode_is_late(now));
         let mode = self.mode().unwrap_or(OperationMode::None);
         let runs_by_itself = self.runs_by_itself_in(mode);
         let (Activity::Power(power), Some(sample)) = (&mut self.activity, self.image.sample())
@@ -156,6 +204,12 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         };
         let status = sample.status;
         let goal = power.sequence.goal();
+        if status.state() != PowerState::OperationEnabled {
+            power.before = here.map(|here| here.position);
+        }
+        let lets_go = goal == Goal::QuickStop
+            && !standing
+            && here.is_some_and(|here| power.braking.lets_go(here, window));
         let (since, then, timeout) = (power.since, power.then, power.poll_timeout());
         // Stopped is what the drive says after it has had the command, not what it said before.
         let fresh = sample.at.since(since) >= self.settings.common.sync_period * 2;
@@ -165,8 +219,14 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             false => step,
         };
         match step {
+            PowerStep::Command(_) if lets_go && !self.settings.gravity => {
+                if !self.control.is_empty() {
+                    self.send_control(now, Controlword::empty());
+                }
+            }
+            PowerStep::Command(Controlword::ENABLE_COMMAND) if is_late => {}
             PowerStep::Command(Controlword::ENABLE_COMMAND) if runs_by_itself => {
-                self.await_mode_while_off(now, since, mode);
+                self.refuse_mode(now, mode);
             }
             PowerStep::Command(control) => {
                 let control = self.with_halt(goal, control);
@@ -193,6 +253,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     fn power_reached(&mut self, now: Time, goal: Goal, then: Then) {
         match (goal, then) {
             (Goal::OperationEnabled, _) => self.enabled(now),
+            (Goal::QuickStop, Then::Tell) if self.has_let_go() => {
+                let device = self.node.name();
+                self.finish(Err(DeviceError::NoQuickStop { device }));
+            }
             (_, Then::Enable) => self.begin_power(now, Goal::OperationEnabled, Then::Tell),
             (_, Then::BeSilent) => {
                 self.activity = Activity::Idle;
@@ -204,8 +268,29 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
+    /// Whether the quick stop under way had no effect, so that the drive was switched off in motion.
+    const fn has_let_go(&self) -> bool {
+        match &self.activity {
+            Activity::Power(power) => power.braking.lets_go,
+            _ => false,
+        }
+    }
+
+    /// Whether the mode display may still follow before the drive is enabled.
+    fn mode_is_late(&self, now: Time) -> bool {
+        let Activity::Power(power) = &self.activity else {
+            return false;
+        };
+        let is_other = self.commanded_mode.is_some() && self.mode() != self.commanded_mode;
+        is_other && now.since(power.since) < self.settings.timeouts.mode
+    }
+
     /// The drive is enabled: from now on its axis is watched.
     fn enabled(&mut self, now: Time) {
+        let before = match &self.activity {
+            Activity::Power(power) => power.before,
+            _ => None,
+        };
         self.kept = Some(PowerState::OperationEnabled);
         self.open_target = false;
         self.other_mode = 0;
@@ -225,7 +310,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.finish(Ok(()));
             }
             _ => {
-                self.envelope.take_hold();
+                self.envelope.take_hold(before);
                 self.finish(Ok(()));
             }
         }
@@ -242,10 +327,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         !(needs_an_edge || is_cyclic || self.commanded_mode == Some(mode))
     }
 
-    fn await_mode_while_off(&mut self, now: Time, since: Time, seen: OperationMode) {
-        if now.since(since) < self.settings.timeouts.mode {
-            return;
-        }
+    fn refuse_mode(&mut self, now: Time, seen: OperationMode) {
         let expected = self.commanded_mode.map_or(0, OperationMode::raw);
         self.send_control(now, Controlword::empty());
         self.finish(Err(DeviceError::WrongMode {
@@ -264,7 +346,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Goal::OperationEnabled if self.control == Controlword::ENABLE_COMMAND => {
                 self.send_control(now, Controlword::empty());
             }
-            Goal::OperationEnabled | Goal::SwitchOnDisabled | Goal::QuickStop => {}
+            // What keeps it enabled is told now; that it is so is no news.
+            Goal::SwitchOnDisabled | Goal::QuickStop => self.told_unasked = true,
+            Goal::OperationEnabled => {}
         }
         match failure {
             PowerFailure::Faulted { state } | PowerFailure::Wanders { state } => {

@@ -222,7 +222,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         match phase {
             Phase::AwaitingOn if self.is_enabled() => {
                 self.kept = true;
-                self.envelope.take_hold();
+                self.envelope.take_hold(None);
                 self.finish(Ok(()));
             }
             Phase::AwaitingRest => {
