@@ -20,6 +20,9 @@ impl Machine {
         self.devices.lookouts.fill(Lookout::default());
         self.zeroed.fill(false);
         self.approach.iter_mut().for_each(ApproachTracker::forget);
+        if self.ports.is_synchronous {
+            self.ports.set_sync(&mut *self.transport, false)?;
+        }
         self.ports.set_sync(&mut *self.transport, true)?;
         let machine_devices = self.devices.instrument_device(0);
         let detectors = self.devices.detector_cameras();

@@ -160,3 +160,10 @@ impl Machine {
         kept_zero::forget_doubted(self);
     }
 }
+
+/// Lets the drives of a stopped `machine` send on: their drivers stop one that is enabled by itself. Alarms end nothing
+/// meanwhile.
+pub fn watch_stopped(machine: &mut Machine) {
+    // A bus that is gone has failed before.
+    let _ = machine.ports.set_sync(&mut *machine.transport, true);
+}

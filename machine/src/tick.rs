@@ -202,6 +202,16 @@ impl Machine {
             // Nothing is done with files before everything has been stopped.
             self.doubted[*at] |= !is_of_communication(alarm);
         }
+        if self.supervision == Supervision::Off {
+            for (at, alarm) in &raised {
+                // Its driver stops it; nothing else is under way that could end.
+                if let Alarm::EnabledUnasked { .. } = alarm {
+                    let device = self.devices.name(*at);
+                    self.notices
+                        .warn(format!("{device}: {alarm}; it was stopped"));
+                }
+            }
+        }
         // An instrument or a camera that nobody reads may have its beam blocked.
         let machines_own = self.devices.instrument_device(0);
         let is_used = |at| self.instrument_in_use == Some(self.devices.name(at));

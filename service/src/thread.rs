@@ -261,6 +261,7 @@ impl Kept {
         let failure = machine::diagnose(&mut self.machine, failure);
         self.keeper.borrow_mut().explain_fault(&failure);
         self.keeper.borrow_mut().end_fault(&self.machine);
+        machine::watch_stopped(&mut self.machine);
     }
 
     fn end_for(&mut self, reply: Reply) -> Result<(), Failure> {

@@ -3,6 +3,7 @@
 //! A halted drive holds its old target, and goes on to that as soon as HALT falls. So the axis'
 //! own place becomes the new target under HALT, and HALT falls once the drive has acknowledged
 //! that. A drive that acknowledges nothing under HALT keeps HALT, until it is switched off and on.
+//! A drive that was enabled settles likewise.
 
 use core::time::Duration;
 
@@ -137,9 +138,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn end_halting(&mut self, now: Time) {
-        self.enter_halt(now, HaltPhase::Settling, ACKNOWLEDGED_WITHIN);
+        self.settle(now);
         self.send_control(now, Controlword::ENABLE_COMMAND);
         self.repeat_at = Time::NEVER;
+    }
+
+    /// Ends the command under way once the enabled axis stands.
+    pub(super) fn settle(&mut self, now: Time) {
+        self.repeat_at = Time::NEVER;
+        self.enter_halt(now, HaltPhase::Settling, ACKNOWLEDGED_WITHIN);
     }
 
     fn stand(&mut self) {

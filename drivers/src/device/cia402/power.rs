@@ -311,7 +311,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             }
             _ => {
                 self.envelope.take_hold(before);
-                self.finish(Ok(()));
+                // A drive that sets off by itself shows so within some samples.
+                self.settle(now);
             }
         }
     }
