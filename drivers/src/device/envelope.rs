@@ -28,6 +28,8 @@ const JUDGED_OVER: Duration = Duration::from_millis(50);
 const SPEED_MARGIN: f64 = 1.1;
 /// A drive brakes later and softer than a calculation says.
 const STOPPING_MARGIN: f64 = 1.5;
+/// More false positions in a row are no noise of the bus.
+const IMPOSSIBLE_MAX: u8 = 5;
 /// An axis is where it shall stand once so many samples lie there.
 const QUIET_SAMPLES: u8 = 3;
 /// From a command to the first sample that shows its effect, in SYNC periods.
@@ -48,6 +50,8 @@ pub(super) struct Figures {
     pub(super) hold_limit: i64,
     /// How far a standing axis may be from its place.
     pub(super) window: i64,
+    /// Counts per second that the axis can go at most.
+    pub(super) speed_max: f64,
 }
 
 /// A moment and a position.
@@ -105,6 +109,8 @@ pub(super) struct Envelope {
     /// While homing, the last position that the speed allows, and one after that which it does not.
     good: Option<Point>,
     odd: Option<i64>,
+    /// So many samples in a row are where no axis can have gone.
+    impossible: u8,
 }
 
 impl Envelope {
@@ -117,6 +123,7 @@ impl Envelope {
             excess: [0.0; 2],
             good: None,
             odd: None,
+            impossible: 0,
         }
     }
 
@@ -327,6 +334,20 @@ impl Envelope {
             (sample.position - from).abs() as f64 <= reach + figures.window as f64
         };
         let span = sample.at.since(good.at).max(figures.period);
+        let can_be = |from: i64, span: Duration| {
+            let reach = figures.speed_max * 2.0 * (span + figures.stall_max).as_secs_f64();
+            (sample.position - from).abs() as f64 <= reach + figures.lag as f64
+        };
+        if let Some(odd) = self.odd
+            && !can_be(good.position, span)
+            && !can_be(odd, figures.period)
+            && self.impossible < IMPOSSIBLE_MAX
+        {
+            self.impossible += 1;
+            self.odd = Some(sample.position);
+            return false;
+        }
+        self.impossible = 0;
         let odd = match (is_near(good.position, span), self.odd) {
             (true, _) => None,
             (false, None) => {
@@ -374,7 +395,7 @@ impl Envelope {
         };
         (self.mark, self.samples) = (Some(here), 0);
         self.excess = [0.0; 2];
-        (self.good, self.odd) = (Some(here), None);
+        (self.good, self.odd, self.impossible) = (Some(here), None, 0);
     }
 }
 
@@ -400,6 +421,7 @@ mod tests {
             lag: 500,
             hold_limit: 50,
             window: 5,
+            speed_max: 100_000.0,
         })
     }
 

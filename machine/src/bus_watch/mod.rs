@@ -237,7 +237,12 @@ pub(crate) const fn is_absence(failure: &Failure) -> bool {
     matches!(
         failure,
         Failure::Overdue { .. }
-            | Failure::Engine(EngineFailure::Missing { .. } | EngineFailure::NotSent { .. })
+            | Failure::Engine(
+                EngineFailure::Missing { .. }
+                    | EngineFailure::NotSent { .. }
+                    // Whatever fills a bus keeps this computer busy.
+                    | EngineFailure::HeldUp { .. },
+            )
             | Failure::Send {
                 source: SendError::QueueFull { .. },
                 ..

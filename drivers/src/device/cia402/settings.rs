@@ -3,8 +3,8 @@
 use core::time::Duration;
 
 use units::{
-    Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Radians, RadiansPerSecond,
-    RadiansPerSecondSquared, Scale,
+    Coordinate, Metres, MetresPerSecond, MetresPerSecondSquared, Quantity, Radians,
+    RadiansPerSecond, RadiansPerSecondSquared, Scale,
 };
 
 use crate::device::ReferenceProof;
@@ -294,6 +294,7 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             lag: lag.max(window),
             hold_limit: hold_limit.max(window),
             window,
+            speed_max: self.speed_max.value() / self.scale.resolution().abs().value(),
         }
     }
 

@@ -27,6 +27,7 @@ impl<Q: Coordinate> CopleySettings<Q> {
             lag,
             hold_limit: self.hold_limit.map_or(lag / 10, counts).max(window),
             window,
+            speed_max: self.speed_max.value() / self.scale.resolution().abs().value(),
         }
     }
 
