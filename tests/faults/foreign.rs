@@ -50,12 +50,15 @@ fn whoever_floods_an_interface_that_counts_no_bits_is_named_whatever_the_priorit
     }
 }
 
-/// The loop takes what waits, but not for ever.
+/// The loop takes what waits, but not for ever. Where the flood begins with a slot of the bus's account (1500 to 1503 ms
+/// here), the pause of this computer is told in its place.
 #[test]
 fn whoever_floods_an_interface_that_counts_no_bits_is_named_while_axes_follow_a_path() {
-    for (cob_id, name) in [(0x001, "0x001"), (0x7F0, "0x7F0")] {
-        let scene = Scene::during(Phase::Follow).after_ms(1500);
-        check_named(swamped(scene.fault(babble(cob_id))), &[CAN, name]);
+    for after_ms in [1400, 1495, 1510, 1600] {
+        for (cob_id, name) in [(0x001, "0x001"), (0x7F0, "0x7F0")] {
+            let scene = Scene::during(Phase::Follow).after_ms(after_ms);
+            check_named(swamped(scene.fault(babble(cob_id))), &[CAN, name]);
+        }
     }
 }
 
