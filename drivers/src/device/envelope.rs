@@ -28,6 +28,8 @@ const JUDGED_OVER: Duration = Duration::from_millis(50);
 const SPEED_MARGIN: f64 = 1.1;
 /// A drive brakes later and softer than a calculation says.
 const STOPPING_MARGIN: f64 = 1.5;
+/// A step of more than so many times the speed asked for is no motion.
+const STEP_MAX: f64 = 16.0;
 /// More false positions in a row are no noise of the bus.
 const IMPOSSIBLE_MAX: u8 = 5;
 /// An axis is where it shall stand once so many samples lie there.
@@ -111,6 +113,8 @@ pub(super) struct Envelope {
     odd: Option<i64>,
     /// So many samples in a row are where no axis can have gone.
     impossible: u8,
+    /// The first long step, from where it began.
+    stepped: Option<(Point, i64)>,
 }
 
 impl Envelope {
@@ -124,6 +128,7 @@ impl Envelope {
             good: None,
             odd: None,
             impossible: 0,
+            stepped: None,
         }
     }
 
@@ -268,7 +273,7 @@ impl Envelope {
                 profile,
             } => {
                 if asked == Asked::Homing && !self.takes_step(sample, profile) {
-                    return None;
+                    return self.judge_step(sample, profile);
                 }
                 (asked, (low, high), Some(profile))
             }
@@ -364,6 +369,26 @@ impl Envelope {
         true
     }
 
+    /// A long step in the direction of the search that was followed by a change of coordinates: the
+    /// axis came to its home too fast to be seen twice.
+    fn judge_step(&mut self, sample: Point, profile: Profile) -> Option<Departure> {
+        let (good, odd, mark) = (self.good?, self.odd?, self.mark?);
+        let before = self.stepped.replace((good, odd))?;
+        let (from, to) = before;
+        let (step, searched) = (to - from.position, from.position - mark.position);
+        let period = self.figures.period.as_secs_f64();
+        let reach = profile.speed * SPEED_MARGIN * period;
+        let seen = step.abs() as f64 / period;
+        let is_motion = step.signum() == searched.signum() && seen < profile.speed * STEP_MAX;
+        let is_fast = step.abs() as f64 > reach * 2.0 + self.figures.hold_limit as f64;
+        let has_jumped = sample.position != to;
+        (is_motion && is_fast && has_jumped).then_some(Departure::Speed {
+            asked: Asked::Homing,
+            limit: profile.speed,
+            seen,
+        })
+    }
+
     /// The coordinates have changed by `step`.
     const fn shift(&mut self, step: i64) {
         if let Request::Within { low, high, .. } = &mut self.request {
@@ -396,6 +421,7 @@ impl Envelope {
         (self.mark, self.samples) = (Some(here), 0);
         self.excess = [0.0; 2];
         (self.good, self.odd, self.impossible) = (Some(here), None, 0);
+        self.stepped = None;
     }
 }
 

@@ -12,7 +12,6 @@ mod vigil;
 
 use core::time::Duration;
 use std::collections::VecDeque;
-
 use units::Time;
 use wire::Input;
 use wire::Payload;
@@ -97,8 +96,8 @@ pub(super) struct CanopenNode {
     identity: Option<Identity>,
     last_pdo: Time,
     pdo_silent: bool,
-    /// The node confirmed that it watches our heartbeat.
     watches_master: bool,
+    lost_master: bool,
     emergencies: u64,
     heartbeats_lost: u64,
     boot_ups: u64,
@@ -123,6 +122,7 @@ impl CanopenNode {
             last_pdo: Time::ZERO,
             pdo_silent: false,
             watches_master: false,
+            lost_master: false,
             emergencies: 0,
             heartbeats_lost: 0,
             boot_ups: 0,
@@ -185,7 +185,7 @@ impl CanopenNode {
         self.events.clear();
         self.identity = None;
         self.pdo_silent = false;
-        self.watches_master = false;
+        (self.watches_master, self.lost_master) = (false, false);
         self.consumer.rest();
         self.twins.forget();
         self.description = description;

@@ -2,7 +2,7 @@
 
 use units::Time;
 use wire::canopen::Object;
-use wire::canopen::emcy::Emergency;
+use wire::canopen::emcy::{Emergency, EmergencyCode};
 use wire::canopen::nmt::NmtState;
 
 use super::{CanopenNode, NodeEvent, Phase};
@@ -17,6 +17,11 @@ impl CanopenNode {
     /// Whether its watch on our heartbeat was written and read back since the start, and it has not booted since.
     pub(in crate::device) const fn watches_master(&self) -> bool {
         self.watches_master
+    }
+
+    /// Whether the node reported since the start that it had lost our heartbeat: an end of this program makes it do so.
+    pub(in crate::device) const fn lost_master(&self) -> bool {
+        self.lost_master
     }
 
     /// Ends that watch: without our heartbeat the node would fault. `false`: it watches none.
@@ -105,6 +110,8 @@ impl CanopenNode {
 
     pub(super) fn take_emergency(&mut self, emergency: Emergency) {
         self.emergencies += 1;
+        self.lost_master = emergency.code == EmergencyCode::HEARTBEAT_LOST
+            || self.lost_master && !emergency.code.is_cleared();
         // During the start it is only counted: what was wrong shows in the device's state.
         if self.is_up() && !emergency.code.is_cleared() {
             let node = self.settings.node;

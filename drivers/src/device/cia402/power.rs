@@ -116,7 +116,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_enable(&mut self, now: Time, was_moving: bool) {
         self.was_enabled = true;
         let enabled = self.state() == Some(PowerState::OperationEnabled);
-        if !enabled {
+        if self.state() == Some(PowerState::Fault) && self.node.lost_master() {
+            // The end of a program like this one made the drive fault, and the heartbeat runs again.
+            self.begin_power(now, Goal::FaultReset, Then::Enable);
+        } else if !enabled {
             self.begin_power(now, Goal::OperationEnabled, Then::Tell);
         } else if was_moving {
             self.begin_halt(now);
