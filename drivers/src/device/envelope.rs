@@ -16,7 +16,7 @@
 
 use core::time::Duration;
 
-use units::Time;
+use units::{Coordinate, Quantity, Scale, Time};
 
 use super::departure::{Asked, Departure};
 
@@ -54,6 +54,32 @@ pub(super) struct Figures {
     pub(super) window: i64,
     /// Counts per second that the axis can go at most.
     pub(super) speed_max: f64,
+}
+
+impl Profile {
+    /// A motion at `speed` with `acceleration`, of an axis of `scale`.
+    pub(super) fn new<Q: Coordinate>(
+        scale: Scale<Q>,
+        speed: Q::Speed,
+        acceleration: Q::Acceleration,
+    ) -> Self {
+        let count = scale.resolution().abs().value();
+        Self {
+            speed: speed.abs().value() / count,
+            acceleration: acceleration.abs().value() / count,
+        }
+    }
+}
+
+/// The hold limit of an axis in counts: a tenth of its `lag` where none is set, at least its `window`.
+pub(super) fn hold_limit<Q: Coordinate>(
+    scale: Scale<Q>,
+    set: Option<Q>,
+    lag: i64,
+    window: i64,
+) -> i64 {
+    let limit = set.map_or(lag / 10, |limit| scale.to_counts(limit).0.saturating_abs());
+    limit.max(window)
 }
 
 /// A moment and a position.

@@ -1,4 +1,4 @@
-//! What begins after a stop: no axis goes on to a target of before. Judged by the plant.
+//! Requests after a stop: no axis goes on to a target of before. Judged by the plant.
 
 use core::time::Duration;
 

@@ -2,7 +2,7 @@
 //! mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Approach, Coordinate, Counts, Quantity, Time};
+use units::{Approach, Coordinate, Counts, Time};
 use wire::cia402::{Controlword, HomingStatus, OperationMode, Statusword};
 
 use super::convert::{counts_i32, position_counts};
@@ -374,11 +374,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn search_profile(&self, speed: Q::Speed) -> Profile {
-        let count = self.settings.scale.resolution().abs().value();
-        Profile {
-            speed: speed.abs().value() / count,
-            acceleration: self.settings.homing_acceleration.abs().value() / count,
-        }
+        let settings = &self.settings;
+        Profile::new(settings.scale, speed, settings.homing_acceleration)
     }
 
     /// How far a search may go from where it begins.

@@ -9,7 +9,7 @@ use units::{
 
 use crate::device::ReferenceProof;
 use crate::device::canopen_node::NodeSettings;
-use crate::device::envelope::Figures;
+use crate::device::envelope::{Figures, hold_limit};
 
 /// Everything the driver must know about one drive. [`Cia402Settings::new`] leaves to the
 /// drive what is `None`: it is then neither written nor checked.
@@ -285,14 +285,11 @@ impl<Q: Coordinate> Cia402Settings<Q> {
     /// What its motion is judged by.
     pub(super) fn figures(&self) -> Figures {
         let (lag, window) = (self.lag_counts(), self.tolerance_counts());
-        let hold_limit = self.hold_limit.map_or(lag / 10, |limit| {
-            self.scale.to_counts(limit).0.saturating_abs()
-        });
         Figures {
             period: self.common.sync_period,
             stall_max: self.stall_max,
             lag: lag.max(window),
-            hold_limit: hold_limit.max(window),
+            hold_limit: hold_limit(self.scale, self.hold_limit, lag, window),
             window,
             speed_max: self.speed_max.value() / self.scale.resolution().abs().value(),
         }

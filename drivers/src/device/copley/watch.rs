@@ -8,7 +8,7 @@ use units::{Coordinate, Quantity, Time};
 
 use super::script::Step;
 use super::{Activity, CopleyAxis, CopleySettings};
-use crate::device::envelope::{Figures, Point, Profile, TRAVEL_MARGIN};
+use crate::device::envelope::{Figures, Point, Profile, TRAVEL_MARGIN, hold_limit};
 use crate::device::{Alarm, DeviceError};
 
 /// An amplifier samples when it is asked, not when its answer arrives.
@@ -19,13 +19,13 @@ impl<Q: Coordinate> CopleySettings<Q> {
     pub(super) fn figures(&self) -> Figures {
         let counts = |length: Q| self.scale.to_counts(length).0.saturating_abs();
         let window = self.tolerance_counts();
-        // Where the amplifier's own limit is left to it, nobody knows that.
+        // The amplifier's own limit is not known here.
         let lag = counts(self.following_error.unwrap_or(self.jump_margin)).max(window);
         Figures {
             period: self.poll_period,
             stall_max: SAMPLED_EARLIER,
             lag,
-            hold_limit: self.hold_limit.map_or(lag / 10, counts).max(window),
+            hold_limit: hold_limit(self.scale, self.hold_limit, lag, window),
             window,
             speed_max: self.speed_max.value() / self.scale.resolution().abs().value(),
         }
@@ -41,11 +41,7 @@ impl<Q: Coordinate> CopleySettings<Q> {
 
     /// A search at `speed`, in counts per second and per second squared.
     pub(super) fn search_profile(&self, speed: Q::Speed) -> Profile {
-        let count = self.scale.resolution().abs().value();
-        Profile {
-            speed: speed.abs().value() / count,
-            acceleration: self.homing_acceleration.abs().value() / count,
-        }
+        Profile::new(self.scale, speed, self.homing_acceleration)
     }
 }
 
@@ -81,7 +77,7 @@ impl<Q: Coordinate> CopleyAxis<Q> {
         }
     }
 
-    /// A quick stop that nobody asked for: how a command ended before stays to be asked for.
+    /// A quick stop without an order: how a command ended before stays to be asked for.
     fn stop_by_itself(&mut self, now: Time) {
         self.begin_quick_stop(now);
         self.stops_by_itself = true;

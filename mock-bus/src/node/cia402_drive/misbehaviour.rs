@@ -1,4 +1,4 @@
-//! What the [quirks](super::quirks) make of a polite drive.
+//! Behaviour of a drive with [quirks](super::quirks).
 
 use std::time::Duration;
 

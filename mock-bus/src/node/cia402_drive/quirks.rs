@@ -1,4 +1,4 @@
-//! How badly a drive behaves: one key for each way in which real ones differ.
+//! Quirks of a drive: one key for each way in which real ones differ.
 
 use serde::{Deserialize, Serialize};
 

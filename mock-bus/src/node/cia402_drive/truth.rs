@@ -1,4 +1,4 @@
-//! What no master sees of a drive: for judges only.
+//! Truth about a drive that no master sees, for judges only.
 
 use units::Time;
 use wire::cia402::PowerState;

@@ -1,4 +1,4 @@
-//! What a history is made of: the drive's quirks, the requests and their moments.
+//! Parts of a history: the drive's quirks, the requests and their moments.
 
 use core::time::Duration;
 
