@@ -24,6 +24,8 @@ PROFILE_POSITION, HOMING, CYCLIC = 1, 6, 8
 TARGET_REACHED, BIT_12 = 1 << 10, 1 << 12
 NEW_SET_POINT = 1 << 4
 HOMING_SYNCS = 3
+# An EPOS4 counts in turns a minute; the drive here states increments per second and per second squared.
+UNITS = {0x60A9: 0x00B5_0300, 0x60AA: 0x00B5_5700}
 SYNCHRONOUS = 1
 
 
@@ -56,6 +58,8 @@ class Drive:
         for subindex, number in enumerate(numbers, start=1):
             self.store(0x1018, subindex, number)
         self.store(0x6502, 0, MODES)
+        for index, unit in UNITS.items():
+            self.store(index, 0, unit)
         self.node.set_data(0x1008, 0, device.product_name.encode())
 
     def store(self, index, subindex, number):

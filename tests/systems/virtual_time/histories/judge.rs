@@ -309,8 +309,8 @@ impl Judge {
 
     /// The mean speed over the last `span`; `None` before that has passed.
     fn mean_speed(&self, now: Time, here: f64, span: Duration) -> Option<f64> {
-        let looks = self.track.iter().rev();
-        let (at, place) = looks.copied().find(|(at, _)| now - *at >= span)?;
+        let old = self.track.partition_point(|(at, _)| now - *at >= span);
+        let (at, place) = self.track[old.checked_sub(1)?];
         Some((here - place).abs() / (now - at).as_secs_f64())
     }
 
