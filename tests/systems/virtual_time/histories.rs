@@ -109,6 +109,7 @@ fn play_all(count: u64) -> Vec<Played> {
                     }
                     let played = play(seed);
                     if played.violation.is_some() {
+                        println!("{}", played.line().trim_end());
                         wrong.lock().expect("no history panics").push(played);
                     }
                 }
