@@ -1,14 +1,12 @@
 //! Writing a file so that a crash at any moment leaves the old one or the new one.
 
-use std::fs::{self, File, Permissions};
-use std::io::{self, Write};
-use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use core::sync::atomic::{AtomicU32, Ordering};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
 
+use super::files::{Files, OpenFile, OsFiles, write_all};
 use super::{StoreError, io_error};
-
-/// What a file is created with that everybody may use; the umask takes its share off.
-const ORDINARY_MODE: u32 = 0o666;
 
 /// Writes `bytes` to `path`: temporary file in the same folder, fsync, rename, fsync of the
 /// folder. Whatever happens, `path` holds the old content or the whole new one. A file that is
@@ -31,28 +29,67 @@ const ORDINARY_MODE: u32 = 0o666;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn write_new_or_replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    replace_file(&OsFiles, path, bytes)
+}
+
+/// [`write_new_or_replace`] with these `files`.
+///
+/// # Errors
+/// Those of [`write_new_or_replace`].
+pub fn replace_file(files: &dyn Files, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
-    let mut file = tempfile::Builder::new()
-        .prefix(".new-")
-        .permissions(Permissions::from_mode(ORDINARY_MODE))
-        .tempfile_in(folder)
-        .map_err(io_error("create a temporary file beside it", path))?;
-    if let Ok(replaced) = fs::metadata(path) {
-        file.as_file()
-            .set_permissions(replaced.permissions())
-            .map_err(io_error(
-                "set the mode of the temporary file beside it",
-                path,
-            ))?;
+    let made = files.make_folder(folder);
+    made.map_err(io_error("create the folder", folder))?;
+    let mode = files.mode(path).ok();
+    let temporary = create_beside(files, path, mode)?;
+    let replaced = write_temporary(files, temporary, path, bytes);
+    replaced?;
+    let synced = files.sync_folder(folder);
+    synced.map_err(io_error("flush the folder to disk", folder))
+}
+
+/// Creates a temporary file in the folder of `path`.
+fn create_beside(
+    files: &dyn Files,
+    path: &Path,
+    mode: Option<u32>,
+) -> Result<(PathBuf, Box<dyn OpenFile>), StoreError> {
+    /// Programs of one process number, on several hosts, may share a folder.
+    const ATTEMPTS: u32 = 1000;
+    static MADE: AtomicU32 = AtomicU32::new(0);
+    let mut attempts = 0;
+    loop {
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let temporary = path.with_file_name(format!(".new-{}-{number}", std::process::id()));
+        attempts += 1;
+        match files.create(&temporary, mode) {
+            Ok(file) => return Ok((temporary, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempts < ATTEMPTS => {}
+            Err(error) => {
+                return Err(io_error("create a temporary file beside it", path)(error));
+            }
+        }
     }
-    file.write_all(bytes).map_err(io_error("write", path))?;
-    file.as_file()
-        .sync_all()
-        .map_err(io_error("flush it to disk", path))?;
-    file.persist(path)
-        .map_err(|error| io_error("rename the temporary file to it", path)(error.error))?;
-    sync_folder(folder)
+}
+
+/// Writes and syncs a temporary file, and gives it the name `path`. What fails leaves none behind.
+fn write_temporary(
+    files: &dyn Files,
+    (temporary, mut file): (PathBuf, Box<dyn OpenFile>),
+    path: &Path,
+    bytes: &[u8],
+) -> Result<(), StoreError> {
+    let written = write_all(&mut *file, bytes).map_err(io_error("write", path));
+    let synced = written.and_then(|()| file.sync().map_err(io_error("flush it to disk", path)));
+    let renamed = synced.and_then(|()| {
+        let renamed = files.rename(&temporary, path);
+        renamed.map_err(io_error("rename the temporary file to it", path))
+    });
+    if renamed.is_err() {
+        // It only takes place; the cause is the first error.
+        let _ = files.remove(&temporary);
+    }
+    renamed
 }
 
 /// Removes `path`, which need not be there, so that it does not come back after a crash.
@@ -71,16 +108,52 @@ pub fn remove_durably(path: &Path) -> io::Result<()> {
     }
 }
 
-/// A rename is durable only when its folder is.
-fn sync_folder(folder: &Path) -> Result<(), StoreError> {
-    File::open(folder)
-        .and_then(|handle| handle.sync_all())
-        .map_err(io_error("flush the folder to disk", folder))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs::Permissions;
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
+    use crate::records::files::{Fault, SimulatedFiles};
+
+    /// Each call of a replacement fails in each way, then the power is cut at random.
+    #[test]
+    fn a_replacement_leaves_the_old_or_the_new_file() {
+        let path = Path::new("/store/active/x.json");
+        let count = |files: &SimulatedFiles| {
+            replace_file(files, path, b"the old content").unwrap();
+            files.calls()
+        };
+        let old = count(&SimulatedFiles::new());
+        let twice = SimulatedFiles::new();
+        count(&twice);
+        replace_file(&twice, path, b"the new one").unwrap();
+        let mut tried = 0;
+        for call in old..twice.calls() {
+            for fault in [Fault::Error(28), Fault::Partly(28), Fault::End] {
+                for seed in 0..64_u32 {
+                    let files = SimulatedFiles::new();
+                    count(&files);
+                    files.fail(call, fault);
+                    let replaced = replace_file(&files, path, b"the new one");
+                    let mut dice = seed;
+                    files.cut_power(|| {
+                        dice = dice.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+                        f64::from(dice >> 24) / 128.0 - 0.5
+                    });
+                    let kept = files.read(path).unwrap();
+                    let is_new = kept == b"the new one";
+                    assert!(
+                        is_new || kept == b"the old content",
+                        "{call} {fault:?} {kept:?}"
+                    );
+                    assert!(is_new || replaced.is_err(), "{call} {fault:?} {seed}");
+                    tried += 1;
+                }
+            }
+        }
+        assert!(tried > 500, "{tried}");
+    }
 
     #[test]
     fn a_replaced_file_has_the_new_content_and_leaves_no_temporary() {

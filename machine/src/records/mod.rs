@@ -30,6 +30,7 @@ mod atomic;
 mod content;
 mod difference;
 mod failure;
+pub mod files;
 mod hash;
 mod head;
 mod interrupted;
@@ -41,7 +42,7 @@ pub mod sound;
 mod store;
 mod thermometers;
 
-pub use atomic::{remove_durably, write_new_or_replace};
+pub use atomic::{remove_durably, replace_file, write_new_or_replace};
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
 pub use failure::{ModelError, StoreError};
