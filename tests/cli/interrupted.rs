@@ -13,6 +13,7 @@ use truestage::for_tests::PointEntry;
 use truestage::linear::LinearLog;
 use wire::{Input, Payload, Port};
 
+use crate::held::Steps;
 use crate::programs::{Bench, Process, live_rigs};
 
 /// The points of one run: 21 positions from both sides.
@@ -47,18 +48,19 @@ fn points(bench: &Bench) -> Vec<PointEntry> {
     journal(bench).map_or_else(Vec::new, |journal| journal.log.points)
 }
 
-/// A calibration that has measured at least `count` points.
-fn calibrating(bench: &Bench, count: usize) -> Process {
+/// A calibration that has measured at least `count` points; time stands until the second is dropped.
+fn calibrating(bench: &Bench, count: usize) -> (Process, Steps) {
     let mut process = bench.start(&["calibrate"]);
-    process.wait_until(|| points(bench).len() >= count);
-    process
+    let mut time = Steps::of(bench);
+    time.until(&mut process, || points(bench).len() >= count);
+    (process, time)
 }
 
 #[test]
 fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
-        let process = calibrating(&bench, RUN + 3);
+        let (process, time) = calibrating(&bench, RUN + 3);
         let busy = bench.run(&["scan"]).with_code(3);
         assert!(
             busy["error"]
@@ -67,6 +69,7 @@ fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
             "{busy}"
         );
         process.signal(Signal::SIGINT);
+        drop(time);
         let ended = process.end();
         assert!(ended.said.contains("stopped on request"), "{ended:?}");
         assert!(ended.said.contains("--resume"), "{ended:?}");
@@ -93,8 +96,9 @@ fn ctrl_c_stops_in_a_controlled_way_and_the_run_is_resumed() {
 fn a_killed_process_leaves_a_stage_that_stops_by_itself_and_no_half_file() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
-        let process = calibrating(&bench, 3);
+        let (process, time) = calibrating(&bench, 3);
         process.signal(Signal::SIGKILL);
+        drop(time);
         assert_eq!(process.end().code, None);
         let torn = journal(&bench).expect("every point that was written can be read");
         assert!(torn.log.points.len() >= 3 && !torn.complete);

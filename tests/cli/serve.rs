@@ -9,6 +9,7 @@ use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tests::Edit;
 
+use crate::held::{Brake, Steps};
 use crate::programs::{Bench, Process, SOCKET, live_rigs, number, program};
 
 pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
@@ -262,15 +263,16 @@ fn a_service_shows_the_journals_of_runs_and_their_pages() {
     }
 }
 
-/// A client whose calibration goes on.
-fn calibrating(bench: &Bench) -> Process {
+/// A client whose calibration goes on, slowly until the second is dropped.
+fn calibrating(bench: &Bench) -> (Process, Brake) {
     bench.run(&["zero", "machine.toml"]).with_code(0);
     let mut client = bench.start(&["calibrate", "machine.toml"]);
-    client.wait_until(|| {
+    let mut time = Steps::of(bench);
+    time.until(&mut client, || {
         let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
         axis["used_by"].is_string()
     });
-    client
+    (client, time.slowly())
 }
 
 /// A service that is killed is no mistake of whoever waits for it.
@@ -279,8 +281,9 @@ fn a_service_that_is_killed_in_a_run_is_told_as_gone() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);
-        let client = calibrating(&bench);
+        let (client, brake) = calibrating(&bench);
         service.signal(Signal::SIGKILL);
+        drop(brake);
         let ended = client.end();
         assert_eq!(ended.code, Some(4), "{ended:?}");
         assert_eq!(service.end().code, None);
@@ -293,9 +296,10 @@ fn a_signal_to_the_client_stops_its_run_and_leaves_the_machine_kept() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);
-        let client = calibrating(&bench);
+        let (client, brake) = calibrating(&bench);
         client.signal(Signal::SIGINT);
         let ended = client.end();
+        drop(brake);
         assert_eq!(ended.code, Some(130), "{ended:?}");
         let status = bench.run(&["status"]).with_code(0);
         assert_eq!(status["machine"]["state"], "running", "{status}");
@@ -314,12 +318,13 @@ fn a_signal_to_the_client_stops_everything_where_somebody_else_has_the_lease() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);
-        let client = calibrating(&bench);
+        let (client, brake) = calibrating(&bench);
         let body = json!({"name": "anna", "seconds": 3600});
         let (status, lease) = ask(bench.folder(), "POST /v1/lease", &body);
         assert_eq!(status, 200, "{lease}");
         client.signal(Signal::SIGINT);
         let ended = client.end();
+        drop(brake);
         assert_eq!(ended.code, Some(130), "{ended:?}");
         for said in [
             "anna (uid ",

@@ -8,6 +8,7 @@ use nix::sys::signal::Signal;
 use tests::{Edit, ROTARY, Rig};
 use truestage::rotary::PlateLog;
 
+use crate::held::Steps;
 use crate::programs::{Bench, live_rigs, number, text};
 
 /// Three placements, and the emulator's hand that turns the plate whenever it was read: the last
@@ -47,8 +48,12 @@ fn a_table_goes_through_its_cycle_from_process_to_process_and_outlives_one_that_
         refuses_without_a_person(&bench);
 
         let mut process = bench.start(&["calibrate", "--yes"]);
-        process.wait_until(|| journal(&bench).is_some_and(|it| it.log.placements.len() == 1));
+        let mut time = Steps::of(&bench);
+        time.until(&mut process, || {
+            journal(&bench).is_some_and(|read| read.log.placements.len() == 1)
+        });
         process.signal(Signal::SIGKILL);
+        drop(time);
         assert_eq!(process.end().code, None);
         let before = journal(&bench).expect("whole placements are kept");
         assert!(!before.complete);
