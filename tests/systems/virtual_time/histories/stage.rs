@@ -22,7 +22,7 @@ use wire::{Arrival, Input, LinkState, Payload, Port, Ports};
 use super::judge::{Judge, Violation};
 
 /// A machine's thread that has not come back for so long hangs.
-const HANGS: Duration = Duration::from_secs(60);
+const HANGS: Duration = Duration::from_secs(600);
 /// Most programs have started in this time of the machine.
 const START: Duration = Duration::from_millis(1500);
 /// The player says in this time of the wall that its program has started.
