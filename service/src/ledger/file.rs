@@ -13,7 +13,7 @@ use machine::records::replace_file;
 use super::lines::Line;
 
 /// So large is the ballast, in bytes: thousands of ends.
-const BALLAST: usize = 1 << 20;
+pub(super) const BALLAST: usize = 1 << 20;
 
 /// So many folders are made for a machine: `DATA/MACHINE/service`.
 const FOLDERS_MADE: usize = 3;
@@ -34,6 +34,8 @@ pub(super) struct LedgerFile {
     path: PathBuf,
     /// Where it can be trusted.
     open: Option<Trusted>,
+    /// So large is the ballast, in bytes.
+    ballast: usize,
     has_ballast: bool,
 }
 
@@ -46,11 +48,12 @@ struct Trusted {
 }
 
 impl LedgerFile {
-    pub(super) fn new(files: Arc<dyn Files>, path: PathBuf) -> Self {
+    pub(super) fn new(files: Arc<dyn Files>, path: PathBuf, ballast: usize) -> Self {
         Self {
             files,
             path,
             open: None,
+            ballast,
             has_ballast: false,
         }
     }
@@ -132,16 +135,16 @@ impl LedgerFile {
     pub(super) fn release_ballast(&mut self) {
         if core::mem::take(&mut self.has_ballast) {
             // Where it is gone already, its room is free as well.
-            let _ = self.files.remove(&self.ballast());
+            let _ = self.files.remove(&self.ballast_path());
             let _ = self.files.sync_folder(self.folder());
         }
     }
 
     /// Takes the room of the ballast, where it has none.
     pub(super) fn place_ballast(&mut self) -> io::Result<()> {
-        let path = self.ballast();
+        let path = self.ballast_path();
         let length = self.files.open(&path).and_then(|file| file.length());
-        if length.ok() == Some(BALLAST as u64) {
+        if length.ok() == Some(self.ballast as u64) {
             self.has_ballast = true;
             return Ok(());
         }
@@ -160,12 +163,12 @@ impl LedgerFile {
             _ => {}
         }
         let mut file = self.files.create(path, None)?;
-        write_all(&mut *file, &incompressible())?;
+        write_all(&mut *file, &incompressible(self.ballast))?;
         file.sync()?;
         self.files.sync_folder(self.folder())
     }
 
-    fn ballast(&self) -> PathBuf {
+    fn ballast_path(&self) -> PathBuf {
         self.path.with_extension("ballast")
     }
 
@@ -174,8 +177,8 @@ impl LedgerFile {
     }
 }
 
-/// Bytes that no file system makes fewer of.
-fn incompressible() -> Vec<u8> {
+/// So many bytes that no file system makes fewer of.
+fn incompressible(length: usize) -> Vec<u8> {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let words = core::iter::repeat_with(|| {
         state ^= state << 13;
@@ -183,7 +186,7 @@ fn incompressible() -> Vec<u8> {
         state ^= state << 17;
         state.to_le_bytes()
     });
-    words.take(BALLAST / 8).flatten().collect()
+    words.flatten().take(length).collect()
 }
 
 /// Whether an error says that there is no room.

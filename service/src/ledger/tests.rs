@@ -12,13 +12,15 @@ use crate::request::{MoveRequest, RunKind, RunRequest};
 use crate::view::{MotionState, RunPlanView, RunState};
 
 const FOLDER: &str = "/records/service";
+/// Tests copy it often.
+const BALLAST: usize = 4096;
 const NO_SPACE: i32 = 28;
 const IO: i32 = 5;
 const QUOTA: i32 = 122;
 
 fn open(files: &SimulatedFiles) -> (Arc<Ledger>, Writer) {
     let files = Arc::new(files.clone());
-    Ledger::open(files, Path::new(FOLDER)).expect("it can be read")
+    Ledger::open_with(files, Path::new(FOLDER), BALLAST).expect("it can be read")
 }
 
 fn bytes(files: &SimulatedFiles) -> Vec<u8> {
@@ -175,7 +177,7 @@ fn ends_have_the_room_of_the_ballast_and_no_request_has() {
     let moving = motion(&ledger, Some("one"));
     ask(&ledger, &mut writer, moving.clone()).unwrap();
     let ballast = Path::new(FOLDER).join("ledger.ballast");
-    assert_eq!(files.read(&ballast).unwrap().len(), 1 << 20);
+    assert_eq!(files.read(&ballast).unwrap().len(), BALLAST);
     ledger.end(done(&moving));
     files.fail(files.calls(), Fault::Partly(NO_SPACE));
     writer.write();
@@ -186,7 +188,7 @@ fn ends_have_the_room_of_the_ballast_and_no_request_has() {
     assert!(problem.cause.contains("ledger.jsonl"), "{problem}");
     writer.retry_now();
     writer.write();
-    assert_eq!(files.read(&ballast).unwrap().len(), 1 << 20);
+    assert_eq!(files.read(&ballast).unwrap().len(), BALLAST);
     let later = motion(&ledger, None);
     assert_eq!(ask(&ledger, &mut writer, later), Ok(Noted::New));
 }
@@ -330,7 +332,7 @@ impl Told {
     /// A life of the ledger on `files`; each `life` has keys of its own, and asks for those of the one before again.
     fn live(&mut self, files: &SimulatedFiles, life: u32) {
         let shared: Arc<dyn Files> = Arc::new(files.clone());
-        let Ok((ledger, mut writer)) = Ledger::open(shared, Path::new(FOLDER)) else {
+        let Ok((ledger, mut writer)) = Ledger::open_with(shared, Path::new(FOLDER), BALLAST) else {
             return;
         };
         let writer = &mut writer;

@@ -13,7 +13,7 @@ use machine::records::files::Files;
 use machine::records::replace_file;
 use ring::rand::{SecureRandom, SystemRandom};
 
-use super::file::{LedgerFile, WriteError, is_full};
+use super::file::{BALLAST, LedgerFile, WriteError, is_full};
 use super::health::Health;
 use super::lines::{Line, Reading};
 use super::memory::Memory;
@@ -55,6 +55,15 @@ impl Ledger {
     pub(crate) fn open(
         files: Arc<dyn Files>,
         folder: &Path,
+    ) -> Result<(Arc<Self>, Writer), LedgerError> {
+        Self::open_with(files, folder, BALLAST)
+    }
+
+    /// [`Ledger::open`] with a ballast of so many bytes.
+    pub(super) fn open_with(
+        files: Arc<dyn Files>,
+        folder: &Path,
+        ballast: usize,
     ) -> Result<(Arc<Self>, Writer), LedgerError> {
         let path = folder.join("ledger.jsonl");
         let found = read(&*files, &path).map_err(|source| LedgerError {
@@ -115,7 +124,7 @@ impl Ledger {
         });
         let mut writer = Writer {
             ledger: Arc::clone(&ledger),
-            file: LedgerFile::new(Arc::clone(&files), path),
+            file: LedgerFile::new(Arc::clone(&files), path, ballast),
             files,
             damaged,
             cause: None,
