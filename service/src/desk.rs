@@ -10,8 +10,8 @@ use core::time::Duration;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Instant;
 
@@ -20,13 +20,14 @@ use tokio::sync::oneshot;
 use truestage::Failure;
 
 use crate::figures::Figures;
-use crate::keeper::utc_now;
-use crate::ledger::{Asked, Ledger, LedgerError};
+use crate::keeper::stopped_by;
+use crate::ledger::{Asked, AskedMotion, End, Ledger, Noted, WRITE_LIMIT};
 use crate::order::{Answer, Answered, Letter, Order, Reply, Unanswered};
 use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Board, Fixed, Snapshot};
-use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
+use crate::stops::{Arrival, Stops};
+use crate::view::{AxisView, Ending, Event, Leased, MachineView, MotionView, StorageView};
 pub(crate) use along::Judges;
 pub(crate) use runs::Prepared;
 
@@ -46,7 +47,8 @@ struct Shared {
     fixed: Arc<Fixed>,
     /// What the numbers of events count from.
     events_from: u64,
-    ledger: Mutex<Ledger>,
+    ledger: Arc<Ledger>,
+    stops: Arc<Stops>,
     store: Store,
     /// Who makes a page of a journal.
     page: Option<Page>,
@@ -80,10 +82,10 @@ fn ended() -> Problem {
 
 impl Desk {
     pub(crate) fn new(
-        letters: SyncSender<Letter>,
+        (letters, stops): (SyncSender<Letter>, Arc<Stops>),
         board: Board,
         fixed: Arc<Fixed>,
-        ledger: Ledger,
+        ledger: Arc<Ledger>,
         store: Store,
         (page, judges): (Option<Page>, Judges),
     ) -> Self {
@@ -91,7 +93,8 @@ impl Desk {
             board,
             fixed,
             events_from: ledger.events_from(),
-            ledger: Mutex::new(ledger),
+            ledger,
+            stops,
             store,
             page,
             judges,
@@ -103,12 +106,23 @@ impl Desk {
         }
     }
 
-    /// Gives an order; never waits.
+    /// Gives an order that has just arrived; never waits.
     pub(crate) fn give(&self, caller: &Caller, order: Order) -> Result<Pending, Problem> {
+        self.give_since(self.stops().arrival(), caller, order)
+    }
+
+    /// Gives an order that arrived then: a stop that arrived since voids it.
+    pub(crate) fn give_since(
+        &self,
+        arrival: Arrival,
+        caller: &Caller,
+        order: Order,
+    ) -> Result<Pending, Problem> {
         let (reply, answer) = Reply::new(&self.shared.unanswered);
         let letter = Letter {
             order,
             caller: caller.clone(),
+            arrival,
             reply,
         };
         let sent = self.letters.try_send(letter);
@@ -134,9 +148,26 @@ impl Desk {
         self.give(caller, order)?.wait().map(|_| ())
     }
 
-    fn ledger(&self) -> MutexGuard<'_, Ledger> {
-        let ledger = &self.shared.ledger;
-        ledger.lock().unwrap_or_else(PoisonError::into_inner)
+    fn done_since(&self, arrival: Arrival, caller: &Caller, order: Order) -> Result<(), Problem> {
+        let given = self.give_since(arrival, caller, order)?;
+        given.wait().map(|_| ())
+    }
+
+    fn ledger(&self) -> &Ledger {
+        &self.shared.ledger
+    }
+
+    /// Where stops arrive.
+    pub(crate) fn stops(&self) -> &Arc<Stops> {
+        &self.shared.stops
+    }
+
+    /// Says among the events what a person should look after.
+    pub(crate) fn warn(&self, texts: Vec<String>) {
+        for text in texts {
+            // A machine that has ended has nobody to tell.
+            let _ = self.give(&Caller::default(), Order::Warn { text });
+        }
     }
 
     pub(crate) fn fixed(&self) -> &Fixed {
@@ -146,14 +177,6 @@ impl Desk {
     pub(crate) fn snapshot(&self) -> Snapshot {
         self.shared.board.newest()
     }
-}
-
-/// What a request for a motion or a run comes to before it is judged.
-pub(crate) enum Noted {
-    /// It was made before: what it became.
-    Before(String),
-    /// It is on the disk under this name, and may be ordered.
-    New(String),
 }
 
 /// Motions.
@@ -169,45 +192,30 @@ impl Desk {
         request: &MoveRequest,
         key: Option<&str>,
     ) -> Result<String, Problem> {
-        let id = match self.note_motion(caller, request, key)? {
-            Noted::Before(id) => return Ok(id),
-            Noted::New(id) => id,
-        };
+        let arrival = self.stops().arrival();
+        let (id, noted) = self.note_motion(caller, request, key)?;
+        if let Noted::Before(id) = noted {
+            return Ok(id);
+        }
         let order = Order::Move {
             id: id.clone(),
             request: request.clone(),
         };
-        let answered = self.done(caller, order);
+        let answered = self.done_since(arrival, caller, order);
         self.settle_motion(id, answered)
     }
 
-    /// Looks whether a request was made before, and notes it when it was not.
+    /// Looks whether a request was made before, and notes it under a new name when it was not. Waits for the disk.
     pub(crate) fn note_motion(
         &self,
         caller: &Caller,
         request: &MoveRequest,
         key: Option<&str>,
-    ) -> Result<Noted, Problem> {
-        let mut ledger = self.ledger();
-        if let Some(before) = key.and_then(|key| ledger.of_key(key)) {
-            if before.request == *request {
-                return Ok(Noted::Before(before.id.clone()));
-            }
-            return Err(key_reused(&format!("motion {}", before.id)));
-        }
-        if let Some(run) = key.and_then(|key| ledger.run_of_key(key)) {
-            return Err(key_reused(&format!("run {}", run.id)));
-        }
-        let id = ledger.next_id('m');
-        let asked = Asked {
-            id: id.clone(),
-            key: key.map(str::to_owned),
-            by: caller.name.clone(),
-            at: utc_now(),
-            request: request.clone(),
-        };
-        ledger.ask(asked).map_err(|it| storage(&it))?;
-        Ok(Noted::New(id))
+    ) -> Result<(String, Noted), Problem> {
+        let id = self.ledger().next_id('m');
+        let asked = AskedMotion::now(id.clone(), key, &caller.name, request);
+        let noted = self.ledger().note(Asked::Motion(asked))?;
+        Ok((id, noted))
     }
 
     /// What became of the order of a motion, or of a run with a key.
@@ -219,8 +227,7 @@ impl Desk {
         match answered {
             Ok(()) => Ok(id),
             Err(problem) => {
-                // That nothing moved is said whatever becomes of the note.
-                let _ = self.ledger().refuse(&id);
+                self.ledger().refuse(&id);
                 Err(problem)
             }
         }
@@ -233,17 +240,21 @@ impl Desk {
     pub fn motion(&self, id: &str) -> Result<MotionView, Problem> {
         let snapshot = self.snapshot();
         let mut motions = snapshot.motions.iter();
-        if let Some(view) = motions.find(|it| it.id == *id) {
-            return Ok(MotionView::clone(view));
+        if let Some(view) = motions.find(|view| view.id == *id) {
+            return Ok(self.with_kept(view));
         }
-        let ledger = self.ledger();
-        if let Some(view) = ledger.end_of(id) {
-            return Ok(view.clone());
+        let known = self.ledger().motion(id);
+        known
+            .ok_or_else(|| Problem::new(Code::NoSuchMotion, format!("there is no motion {id}"), ""))
+    }
+
+    /// A motion of a snapshot. Its end goes to the disk at once.
+    fn with_kept(&self, view: &Arc<MotionView>) -> MotionView {
+        let ended = view.state.is_end().then(|| End::Motion(Arc::clone(view)));
+        MotionView {
+            kept: ended.and_then(|end| self.ledger().end(end)),
+            ..MotionView::clone(view)
         }
-        let asked = ledger.of_id(id).ok_or_else(|| {
-            Problem::new(Code::NoSuchMotion, format!("there is no motion {id}"), "")
-        })?;
-        Ok(unended(asked, ledger.is_of_earlier_boot(asked)))
     }
 
     /// The motion `id` once it has ended, or after `limit`, whichever comes first.
@@ -251,24 +262,14 @@ impl Desk {
     /// # Errors
     /// When there is none.
     pub fn wait_motion(&self, id: &str, limit: Duration) -> Result<MotionView, Problem> {
-        let begun = Instant::now();
-        loop {
-            let view = self.motion(id)?;
-            if view.state.is_end() || begun.elapsed() >= limit {
-                return Ok(view);
-            }
-            thread::sleep(LOOK_EVERY);
-        }
+        await_end(limit, || self.motion(id))
     }
 
     /// The motions that are known: those under way, and the last that ended.
     pub fn motions(&self) -> Vec<MotionView> {
         let snapshot = self.snapshot();
-        snapshot
-            .motions
-            .iter()
-            .map(|it| MotionView::clone(it))
-            .collect()
+        let motions = snapshot.motions.iter();
+        motions.map(|view| self.with_kept(view)).collect()
     }
 
     /// Begins a jog, renews it, or (at a speed of 0) ends it; returns the name of the motion that it is. It stops
@@ -298,60 +299,56 @@ impl Desk {
         self.done(caller, Order::Renew { motion })
     }
 
-    /// Writes down how motions, and runs with a key, ended, for after a restart. Whoever serves calls it now and then.
+    /// Notes how motions, and runs with a key, ended, for after a restart; nothing is written here.
+    pub(crate) fn note_ends(&self) {
+        let snapshot = self.snapshot();
+        let ended = snapshot.motions.iter().filter(|view| view.state.is_end());
+        for view in ended {
+            self.ledger().end(End::Motion(Arc::clone(view)));
+        }
+        let ended = snapshot.runs.iter().filter(|view| view.state.is_end());
+        for view in ended {
+            self.ledger().end(End::Run(Arc::clone(view)));
+        }
+    }
+
+    /// What is known of the disk that motions and runs are written to.
+    pub fn storage(&self) -> StorageView {
+        self.ledger().storage()
+    }
+
+    /// How many Idempotency-Keys are remembered.
+    pub(crate) fn keys(&self) -> usize {
+        self.ledger().keys()
+    }
+
+    /// Accepts for `caller` that part of an earlier ledger is lost: requests with a key are taken again.
     ///
     /// # Errors
-    /// When it cannot be written.
-    pub fn write_ends(&self) -> Result<(), Problem> {
-        let snapshot = self.snapshot();
-        let mut ledger = self.ledger();
-        let ended = snapshot.motions.iter().filter(|it| it.state.is_end());
-        for view in ended {
-            ledger.end(view).map_err(|it| storage(&it))?;
-        }
-        let ended = snapshot.runs.iter().filter(|it| it.state.is_end());
-        for view in ended {
-            ledger.end_run(view).map_err(|it| storage(&it))?;
-        }
-        Ok(())
+    /// When that cannot be written.
+    pub fn accept_damaged_ledger(&self, caller: &Caller) -> Result<(), Problem> {
+        self.ledger().accept_damage(&caller.name)
     }
 }
 
-/// A motion that the machine's thread does not know: asked for this moment, or before a restart.
-fn unended(asked: &Asked, is_of_earlier_boot: bool) -> MotionView {
-    let cause = Cause {
-        code: Code::ServiceRestarted,
-        cause: "the service ended before the end of this motion was written down".into(),
-        exit_code: Code::ServiceRestarted.exit_code(),
-    };
-    let (state, cause) = match is_of_earlier_boot {
-        true => (MotionState::Failed, Some(cause)),
-        false => (MotionState::Queued, None),
-    };
-    MotionView {
-        id: asked.id.clone(),
-        by: asked.by.clone(),
-        accepted: asked.at.clone(),
-        state,
-        stopped: None,
-        cause,
-        axes: std::collections::BTreeMap::new(),
-        told: None,
+/// Asks until the end is on the disk, or `limit` is over; once it has ended, no longer than a write may take.
+fn await_end<T: Ending>(
+    limit: Duration,
+    ask: impl Fn() -> Result<T, Problem>,
+) -> Result<T, Problem> {
+    let begun = Instant::now();
+    let mut ended = None;
+    loop {
+        let asked = ask()?;
+        let is_over = asked.has_ended() && {
+            let since = ended.get_or_insert_with(Instant::now);
+            !asked.waits_for_disk() || since.elapsed() >= WRITE_LIMIT
+        };
+        if is_over || begun.elapsed() >= limit {
+            return Ok(asked);
+        }
+        thread::sleep(LOOK_EVERY);
     }
-}
-
-/// That an Idempotency-Key is that of `other`.
-fn key_reused(other: &str) -> Problem {
-    let what = format!("this Idempotency-Key was used for {other}, which is another one");
-    Problem::new(Code::KeyReused, what, "give each request a key of its own")
-}
-
-fn storage(error: &LedgerError) -> Problem {
-    Problem::new(
-        Code::Storage,
-        error.to_string(),
-        "nothing was moved; free the disk",
-    )
 }
 
 /// The machine as a whole.
@@ -361,6 +358,7 @@ impl Desk {
     /// # Errors
     /// When the service has ended, or too many orders wait.
     pub fn stop(&self, caller: &Caller, mode: StopMode) -> Result<(), Problem> {
+        self.stops().arrive(stopped_by(caller.name.as_str()));
         self.done(caller, Order::Stop { mode })
     }
 

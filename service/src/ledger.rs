@@ -1,26 +1,46 @@
-//! Which request is which motion or run, in a file: the same request never moves twice, not even after a restart.
+//! Ledger: which request is which motion or run, over restarts and power cuts.
 //!
-//! One JSON object a line. A line is written and synced before its order is given to the machine's thread; a
-//! last line that a crash cut off is left out when the file is read, for its order was never given.
+//! Requests are noted in memory, under a lock that is never held over I/O, and wait for one thread that writes
+//! ([`Writer`]). Whoever waits for it gives up after [`WRITE_LIMIT`]. The decision is
+//! `docs/decisions/0074-one-thread-writes-the-ledger.md`.
 
-mod runs;
+mod asked;
+mod file;
+mod health;
+mod lines;
+mod memory;
+#[cfg(test)]
+mod tests;
+mod writer;
 
-use std::collections::{BTreeMap, VecDeque};
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::io;
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
+use jiff::Timestamp;
 
-use crate::request::MoveRequest;
-use crate::view::{MotionView, RunView};
-pub(crate) use runs::AskedRun;
-use runs::KnownRuns;
+use crate::problem::{Code, Problem};
+use crate::view::{MotionView, RunView, StorageView};
+pub(crate) use asked::{Asked, AskedMotion, AskedRun, End};
+use health::Health;
+use lines::Line;
+use memory::{Known, Memory};
+pub(crate) use writer::Writer;
 
-/// So many motions, and so many runs that were asked for with a key, are remembered over a restart.
-const KEPT: usize = 4096;
+/// A write that takes longer has failed for whoever waits for it.
+pub(crate) const WRITE_LIMIT: Duration = Duration::from_secs(2);
+/// How often a request looks whether another one with its key is on the disk.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// So many requests wait for the disk at once.
+const NOTES_MAX: usize = 256;
 
-/// The ledger cannot be read or written.
+/// The ledger cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {source}; what was asked for before a restart is kept there", path.display())]
 pub struct LedgerError {
@@ -30,88 +50,86 @@ pub struct LedgerError {
     pub source: io::Error,
 }
 
-/// A line of the file.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Line {
-    /// The service began for this time.
-    Boot(u64),
-    /// A motion was asked for.
-    Asked(Asked),
-    /// A motion or run was refused: nothing moved.
-    Refused(String),
-    /// It ended.
-    Ended(Box<MotionView>),
-    /// A run was asked for with a key.
-    AskedRun(AskedRun),
-    /// It ended; once more where it went on.
-    EndedRun(Box<RunView>),
+/// What a request comes to before it is judged.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Noted {
+    /// It was made before: the name of what it became.
+    Before(String),
+    /// It is on the disk, and may be ordered.
+    New,
 }
 
-/// A motion that was asked for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Asked {
-    pub(crate) id: String,
-    /// The Idempotency-Key, when there was one.
-    pub(crate) key: Option<String>,
-    pub(crate) by: String,
-    pub(crate) at: String,
-    pub(crate) request: MoveRequest,
+/// What a request comes to before it is written.
+#[derive(Debug)]
+enum Begun {
+    Before(String),
+    /// Another one with its key is being written.
+    Beside,
+    /// It is being written.
+    Writing(Receiver<Result<(), Problem>>),
+}
+
+/// A line that waits for the disk.
+#[derive(Debug)]
+struct Item {
+    text: String,
+    of: ItemOf,
+}
+
+/// What a line is about.
+#[derive(Debug)]
+enum ItemOf {
+    Note(Note),
+    End(Arc<End>),
+    Remark,
+}
+
+/// A request that waits for the disk.
+#[derive(Debug)]
+struct Note {
+    /// Empty where it is about the ledger itself.
+    id: String,
+    answer: SyncSender<Result<(), Problem>>,
+    /// Whether it waits until a power cut leaves it there.
+    needs_sync: bool,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    memory: Memory,
+    pending: VecDeque<Item>,
 }
 
 /// The motions and runs that were asked for.
 #[derive(Debug)]
 pub(crate) struct Ledger {
-    path: PathBuf,
-    file: File,
+    state: Mutex<State>,
+    /// Something waits for the disk.
+    news: Condvar,
+    health: Health,
     boot: u64,
-    motions: u64,
-    asked: VecDeque<Asked>,
-    ended: BTreeMap<String, MotionView>,
-    runs: KnownRuns,
+    /// Of this life of the service: a folder that is restored never gives a name twice.
+    life: String,
+    names: AtomicU64,
+    /// What a person should hear of how the ledger was found.
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Ledger {
-    /// The ledger in `folder`, which is made when it is not there.
-    pub(crate) fn open(folder: &Path) -> Result<Self, LedgerError> {
-        let path = folder.join("ledger.jsonl");
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| LedgerError { path, source }
-        };
-        fs::create_dir_all(folder).map_err(failed(folder))?;
-        let text = match fs::read_to_string(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
-            read => read.map_err(failed(&path))?,
-        };
-        let mut before = Before::default();
-        text.lines()
-            .filter_map(|line| serde_json::from_str(line).ok())
-            .for_each(|line| before.take(line));
-        let boot = before.boot + 1;
-        let lines = before.lines(boot);
-        let temporary = folder.join("ledger.new");
-        let mut file = File::create(&temporary).map_err(failed(&temporary))?;
-        file.write_all(&lines)
-            .and_then(|()| file.sync_all())
-            .and_then(|()| fs::rename(&temporary, &path))
-            .map_err(failed(&path))?;
-        let appended = OpenOptions::new().append(true).open(&path);
-        Ok(Self {
-            file: appended.map_err(failed(&path))?,
-            path,
-            boot,
-            motions: 0,
-            asked: before.asked,
-            ended: before.ended,
-            runs: before.runs,
-        })
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A name that nothing has had, for what kind of thing.
-    pub(crate) fn next_id(&mut self, kind: char) -> String {
-        self.motions += 1;
-        format!("{kind}{}-{}", self.boot, self.motions)
+    pub(crate) fn next_id(&self, kind: char) -> String {
+        let number = self.names.fetch_add(1, Ordering::Relaxed) + 1;
+        format!("{kind}{}{}-{number}", self.boot, self.life)
+    }
+
+    /// Whether this service gave the name `id`.
+    fn is_own(&self, id: &str) -> bool {
+        let own = format!("{}{}-", self.boot, self.life);
+        id.get(1..).is_some_and(|rest| rest.starts_with(&own))
     }
 
     /// What numbers of events count from in this life of the service: none is used twice, so that whoever goes on with one
@@ -121,217 +139,223 @@ impl Ledger {
         (self.boot - 1) << 32
     }
 
-    /// The motion that was asked for with `key`.
-    pub(crate) fn of_key(&self, key: &str) -> Option<&Asked> {
-        let mut asked = self.asked.iter().rev();
-        asked.find(|it| it.key.as_deref() == Some(key))
+    /// Whether what is asked for can be written.
+    ///
+    /// # Errors
+    /// When it cannot.
+    pub(crate) fn require_storage(&self) -> Result<(), Problem> {
+        self.health.check().map_err(|cause| storage(&cause))
     }
 
-    /// The motion `id`.
-    pub(crate) fn of_id(&self, id: &str) -> Option<&Asked> {
-        self.asked.iter().rev().find(|it| it.id == id)
+    /// What is known of the disk.
+    pub(crate) fn storage(&self) -> StorageView {
+        let cause = self.health.check().err();
+        StorageView {
+            ok: cause.is_none(),
+            cause,
+            damaged: self.state().memory.damaged.clone(),
+        }
     }
 
-    /// How the motion `id` ended, when that was written.
-    pub(crate) fn end_of(&self, id: &str) -> Option<&MotionView> {
-        self.ended.get(id)
+    /// How many keys are remembered.
+    pub(crate) fn keys(&self) -> usize {
+        self.state().memory.keys()
     }
 
-    /// Whether `asked` was asked for before the last restart.
-    pub(crate) fn is_of_earlier_boot(&self, asked: &Asked) -> bool {
-        !self.is_own(&asked.id)
+    /// Notes a request, and returns when it is on the disk. One without a key is there after a crash of this
+    /// program, one with a key also after a power cut.
+    ///
+    /// # Errors
+    /// When it cannot be written within [`WRITE_LIMIT`], or its key is that of another request.
+    pub(crate) fn note(&self, asked: Asked) -> Result<Noted, Problem> {
+        let begun = Instant::now();
+        let asked = Arc::new(asked);
+        loop {
+            match self.begin_note(&asked)? {
+                Begun::Before(id) => return Ok(Noted::Before(id)),
+                Begun::Writing(answer) => {
+                    return self.await_note(asked.id(), &answer).map(|()| Noted::New);
+                }
+                Begun::Beside if begun.elapsed() >= WRITE_LIMIT => {
+                    return Err(self.too_slow());
+                }
+                Begun::Beside => thread::sleep(LOOK_EVERY),
+            }
+        }
     }
 
-    /// Whether this service gave the name `id`.
-    fn is_own(&self, id: &str) -> bool {
-        let own = format!("{}-", self.boot);
-        id.get(1..).is_some_and(|it| it.starts_with(&own))
+    fn begin_note(&self, asked: &Arc<Asked>) -> Result<Begun, Problem> {
+        let mut state = self.state();
+        if let Some(key) = asked.key() {
+            if let Some(name) = &state.memory.damaged {
+                return Err(damaged(name));
+            }
+            match state.memory.known(key, Timestamp::now()) {
+                Known::New => {}
+                Known::Full => return Err(keys_full()),
+                Known::Before(entry) if !entry.asked.is_same_request(asked) => {
+                    return Err(key_reused(&entry.asked.called()));
+                }
+                Known::Before(entry) if entry.is_noted => {
+                    return Ok(Begun::Before(entry.asked.id().to_owned()));
+                }
+                Known::Before(_) => return Ok(Begun::Beside),
+            }
+        }
+        self.require_storage()?;
+        let line = asked.line();
+        let answer = self.write_and_answer(&mut state, asked.id(), &line, asked.key().is_some())?;
+        state.memory.ask(Arc::clone(asked), false);
+        Ok(Begun::Writing(answer))
     }
 
-    /// The run that was asked for with `key`.
-    pub(crate) fn run_of_key(&self, key: &str) -> Option<&AskedRun> {
-        self.runs.of_key(key)
+    fn write_and_answer(
+        &self,
+        state: &mut State,
+        id: &str,
+        line: &Line,
+        needs_sync: bool,
+    ) -> Result<Receiver<Result<(), Problem>>, Problem> {
+        if state.pending.len() >= NOTES_MAX {
+            let what = "too many requests wait for the disk";
+            return Err(Problem::new(Code::Busy, what, "ask again in a moment"));
+        }
+        let (answer, answered) = mpsc::sync_channel(1);
+        let note = Note {
+            id: id.to_owned(),
+            answer,
+            needs_sync,
+        };
+        self.push(state, line, ItemOf::Note(note));
+        Ok(answered)
     }
 
-    /// The run `id` that was asked for with a key, as far as it is known.
+    fn push(&self, state: &mut State, line: &Line, of: ItemOf) {
+        let text = line.sealed();
+        state.pending.push_back(Item { text, of });
+        self.news.notify_one();
+    }
+
+    fn await_note(&self, id: &str, answer: &Receiver<Result<(), Problem>>) -> Result<(), Problem> {
+        if let Ok(answered) = answer.recv_timeout(WRITE_LIMIT) {
+            return answered;
+        }
+        // What the disk has of it by now is taken back.
+        self.refuse(id);
+        Err(self.too_slow())
+    }
+
+    fn too_slow(&self) -> Problem {
+        let cause = self.health.check().err();
+        let slow = || format!("a write to the ledger took longer than {WRITE_LIMIT:?}");
+        storage(&cause.unwrap_or_else(slow))
+    }
+
+    /// The motion or run `id` was refused, and nothing moved: its key is free again.
+    pub(crate) fn refuse(&self, id: &str) {
+        let mut state = self.state();
+        let before = state.pending.len();
+        let is_it = |item: &Item| matches!(&item.of, ItemOf::Note(note) if note.id == id);
+        state.pending.retain(|item| !is_it(item));
+        let was_waiting = state.pending.len() < before;
+        if state.memory.entry(id).is_some() && !was_waiting {
+            let line = Line::Refused(id.to_owned());
+            self.push(&mut state, &line, ItemOf::Remark);
+        }
+        state.memory.forget(id);
+    }
+
+    /// Notes an end. Whether it is on the disk; `None` where it is not kept over a restart.
+    pub(crate) fn end(&self, end: End) -> Option<bool> {
+        let mut state = self.state();
+        let id = end.id().to_owned();
+        if let Some(end) = state.memory.end(Arc::new(end)) {
+            let line = end.line();
+            self.push(&mut state, &line, ItemOf::End(end));
+        }
+        state.memory.entry(&id).map(|entry| entry.is_kept)
+    }
+
+    /// The motion `id`, as far as it is known here.
+    pub(crate) fn motion(&self, id: &str) -> Option<MotionView> {
+        let state = self.state();
+        let (asked, entry) = state.memory.motion(id)?;
+        Some(match entry.end.as_deref() {
+            Some(End::Motion(view)) => MotionView {
+                kept: Some(entry.is_kept),
+                ..MotionView::clone(view)
+            },
+            Some(End::Run(_)) | None => asked.unended(self.is_own(id)),
+        })
+    }
+
+    /// The run `id` that was asked for with a key, as far as it is known here.
     pub(crate) fn run(&self, id: &str) -> Option<RunView> {
-        self.runs.run(id, !self.is_own(id))
+        let state = self.state();
+        let entry = state.memory.entry(id)?;
+        match (&*entry.asked, entry.end.as_deref()) {
+            (Asked::Run(_), Some(End::Run(view))) => Some(RunView {
+                kept: Some(entry.is_kept),
+                ..asked::lasting(view)
+            }),
+            (Asked::Run(asked), _) => Some(asked.unended(self.is_own(id))),
+            (Asked::Motion(_), _) => None,
+        }
     }
 
-    /// Notes a run that will be asked for; it is on the disk when this returns.
-    pub(crate) fn ask_run(&mut self, asked: AskedRun) -> Result<(), LedgerError> {
-        self.append(&Line::AskedRun(asked.clone()), true)?;
-        self.runs.ask(asked);
+    /// A person, `by`, accepts that part of an earlier ledger is lost.
+    ///
+    /// # Errors
+    /// When that cannot be written.
+    pub(crate) fn accept_damage(&self, by: &str) -> Result<(), Problem> {
+        self.require_storage()?;
+        let answer = {
+            let mut state = self.state();
+            if state.memory.damaged.is_none() {
+                return Ok(());
+            }
+            self.write_and_answer(&mut state, "", &Line::Accepted(by.to_owned()), true)?
+        };
+        self.await_note("", &answer)?;
+        self.state().memory.damaged = None;
         Ok(())
     }
 
-    /// Notes how a run ended that was asked for with a key.
-    pub(crate) fn end_run(&mut self, view: &RunView) -> Result<(), LedgerError> {
-        match self.runs.end(view) {
-            Some(ended) => self.append(&Line::EndedRun(Box::new(ended)), false),
-            None => Ok(()),
-        }
-    }
-
-    /// Notes a motion that will be asked for; with a key, it is on the disk when this returns.
-    pub(crate) fn ask(&mut self, asked: Asked) -> Result<(), LedgerError> {
-        // Without a key nobody asks for it a second time.
-        let sync = asked.key.is_some();
-        self.append(&Line::Asked(asked.clone()), sync)?;
-        self.asked.push_back(asked);
-        if self.asked.len() > KEPT
-            && let Some(old) = self.asked.pop_front()
-        {
-            self.ended.remove(&old.id);
-        }
-        Ok(())
-    }
-
-    /// The motion or run `id` was refused: its key is free again.
-    pub(crate) fn refuse(&mut self, id: &str) -> Result<(), LedgerError> {
-        self.asked.retain(|it| it.id != id);
-        self.runs.forget(id);
-        self.append(&Line::Refused(id.to_owned()), false)
-    }
-
-    /// Notes how a motion ended, once.
-    pub(crate) fn end(&mut self, view: &MotionView) -> Result<(), LedgerError> {
-        if self.ended.contains_key(&view.id) {
-            return Ok(());
-        }
-        self.ended.insert(view.id.clone(), view.clone());
-        self.append(&Line::Ended(Box::new(view.clone())), false)
-    }
-
-    fn append(&mut self, line: &Line, sync: bool) -> Result<(), LedgerError> {
-        let mut bytes = serde_json::to_vec(line).map_err(|it| self.failed(it.into()))?;
-        bytes.push(b'\n');
-        let written = self.file.write_all(&bytes);
-        let synced = written.and_then(|()| match sync {
-            true => self.file.sync_data(),
-            false => Ok(()),
-        });
-        synced.map_err(|source| self.failed(source))
-    }
-
-    fn failed(&self, source: io::Error) -> LedgerError {
-        let path = self.path.clone();
-        LedgerError { path, source }
+    /// Waits for something to write, at most for so long.
+    pub(crate) fn await_news(&self, limit: Duration) {
+        let state = self.state();
+        let waited = self
+            .news
+            .wait_timeout_while(state, limit, |state| state.pending.is_empty());
+        drop(waited);
     }
 }
 
-/// What a file says that was there.
-#[derive(Default)]
-struct Before {
-    boot: u64,
-    asked: VecDeque<Asked>,
-    ended: BTreeMap<String, MotionView>,
-    runs: KnownRuns,
+/// That an Idempotency-Key is that of `other`.
+fn key_reused(other: &str) -> Problem {
+    let what = format!("this Idempotency-Key was used for {other}, which is another one");
+    Problem::new(Code::KeyReused, what, "give each request a key of its own")
 }
 
-impl Before {
-    fn take(&mut self, line: Line) {
-        match line {
-            Line::Boot(boot) => self.boot = self.boot.max(boot),
-            Line::Asked(asked) => self.asked.push_back(asked),
-            Line::Refused(id) => {
-                self.asked.retain(|it| it.id != id);
-                self.runs.forget(&id);
-            }
-            Line::AskedRun(asked) => self.runs.ask(asked),
-            Line::EndedRun(view) => self.runs.take_end(*view),
-            Line::Ended(view) => {
-                self.ended.insert(view.id.clone(), *view);
-            }
-        }
-    }
-
-    /// The file for the service that begins: as much as is remembered, and the boot.
-    fn lines(&mut self, boot: u64) -> Vec<u8> {
-        let old = self.asked.len().saturating_sub(KEPT);
-        self.asked.drain(..old);
-        let asked = &self.asked;
-        self.ended
-            .retain(|id, _| asked.iter().any(|it| it.id == *id));
-        let asked = self.asked.iter().cloned().map(Line::Asked);
-        let ended = self.ended.values().cloned();
-        let ended = ended.map(|it| Line::Ended(Box::new(it)));
-        let runs = self.runs.all().flat_map(|(asked, ended)| {
-            let ended = ended.map(|it| Line::EndedRun(Box::new(it)));
-            [Line::AskedRun(asked)].into_iter().chain(ended)
-        });
-        let lines = [Line::Boot(boot)].into_iter().chain(asked).chain(ended);
-        let lines = lines.chain(runs);
-        lines
-            .filter_map(|line| serde_json::to_string(&line).ok())
-            .flat_map(|line| format!("{line}\n").into_bytes())
-            .collect()
-    }
+fn keys_full() -> Problem {
+    let what = format!(
+        "{} Idempotency-Keys are kept for at least 7 days each, and there is no room for another",
+        memory::KEYS_MAX
+    );
+    let help = "nothing was moved; use fewer keys, or ask without one";
+    Problem::new(Code::KeysFull, what, help)
 }
 
-#[cfg(test)]
-mod tests {
-    use units::Metres;
+/// That a request cannot be written down.
+fn storage(cause: &str) -> Problem {
+    let help = "nothing was begun, and the request may stand as failed after a restart; free the disk or check it";
+    Problem::new(Code::Storage, cause, help)
+}
 
-    use super::*;
-
-    fn asked(ledger: &mut Ledger, key: &str) -> Asked {
-        Asked {
-            id: ledger.next_id('m'),
-            key: Some(key.to_owned()),
-            by: "a test".into(),
-            at: "2026-01-01T00:00:00.000Z".into(),
-            request: MoveRequest::of("x", Metres::from_mm(1.0)),
-        }
-    }
-
-    #[test]
-    fn what_was_asked_for_is_known_after_a_restart_and_names_are_never_given_twice() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut first = Ledger::open(folder.path()).unwrap();
-        let one = asked(&mut first, "one");
-        first.ask(one.clone()).unwrap();
-        drop(first);
-        let mut second = Ledger::open(folder.path()).unwrap();
-        assert_eq!(second.of_key("one"), Some(&one));
-        assert!(second.is_of_earlier_boot(&one));
-        let two = asked(&mut second, "two");
-        assert_ne!(two.id, one.id);
-        assert!(!second.is_of_earlier_boot(&two));
-    }
-
-    #[test]
-    fn a_refused_request_may_be_made_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut ledger = Ledger::open(folder.path()).unwrap();
-        let one = asked(&mut ledger, "one");
-        ledger.ask(one.clone()).unwrap();
-        ledger.refuse(&one.id).unwrap();
-        assert_eq!(ledger.of_key("one"), None);
-        drop(ledger);
-        assert_eq!(Ledger::open(folder.path()).unwrap().of_key("one"), None);
-    }
-
-    #[test]
-    fn a_file_cut_at_any_byte_loses_at_most_its_last_line() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut ledger = Ledger::open(folder.path()).unwrap();
-        for key in ["one", "two"] {
-            let asked = asked(&mut ledger, key);
-            ledger.ask(asked).unwrap();
-        }
-        let path = folder.path().join("ledger.jsonl");
-        let whole = fs::read(&path).unwrap();
-        let ends: Vec<_> = (0..whole.len()).filter(|at| whole[*at] == b'\n').collect();
-        for length in ends[1]..whole.len() {
-            fs::write(&path, &whole[..length]).unwrap();
-            let ledger = Ledger::open(folder.path()).unwrap();
-            assert!(ledger.of_key("one").is_some(), "{length}");
-            assert_eq!(
-                ledger.of_key("two").is_some(),
-                length == ends[2],
-                "{length}"
-            );
-        }
-    }
+fn damaged(name: &str) -> Problem {
+    let what = format!(
+        "part of the ledger could not be read, and is kept as {name}: a request with a key could move again"
+    );
+    let help = "look what has moved, then accept it by POST /v1/ledger/accept; requests without a key are taken";
+    Problem::new(Code::Storage, what, help)
 }

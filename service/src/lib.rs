@@ -22,6 +22,7 @@ mod quantity;
 mod request;
 mod scribe;
 mod snapshot;
+mod stops;
 mod system_log;
 mod thread;
 mod view;
@@ -45,5 +46,6 @@ pub use thread::{Opened, Service, StartError};
 pub use view::{
     AxisState, AxisView, CalibrationView, Cause, ChangeView, ChosenView, DepartureView, Event,
     GroupView, JournalView, LeaseView, Leased, LegView, MachineState, MachineView, MotionState,
-    MotionView, QuestionView, RunPlanView, RunState, RunView, Stopped, StoredView, ToldView,
+    MotionView, QuestionView, RunPlanView, RunState, RunView, Stopped, StorageView, StoredView,
+    ToldView,
 };

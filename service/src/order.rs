@@ -11,6 +11,7 @@ use crate::problem::Problem;
 use crate::request::{
     AnswerRequest, Caller, JogRequest, LeaseRequest, MoveRequest, RunRequest, StopMode,
 };
+use crate::stops::Arrival;
 use crate::view::Leased;
 
 /// What is asked of the machine's thread.
@@ -67,6 +68,29 @@ pub(crate) enum Order {
 }
 
 impl Order {
+    /// Whether it could move an axis or switch one on: a stop that arrived after it voids it.
+    pub(crate) fn is_voided_by_stop(&self) -> bool {
+        match self {
+            Self::Move { .. }
+            | Self::Reset
+            | Self::Start { .. }
+            | Self::Resume { .. }
+            | Self::Answer { .. } => true,
+            Self::Jog { request, .. } => request.speed.0.value() != 0.0,
+            Self::Power { on, .. } => *on,
+            Self::Plan { request, .. } => request.start,
+            Self::Stop { .. }
+            | Self::Renew { .. }
+            | Self::Abort { .. }
+            | Self::Pause { .. }
+            | Self::Lease { .. }
+            | Self::Calibration(_)
+            | Self::Release
+            | Self::Warn { .. }
+            | Self::End => false,
+        }
+    }
+
     /// Whether only the holder of the lease may ask for it.
     pub(crate) const fn needs_lease(&self) -> bool {
         match self {
@@ -179,5 +203,7 @@ impl Drop for Reply {
 pub(crate) struct Letter {
     pub(crate) order: Order,
     pub(crate) caller: Caller,
+    /// When it was asked for.
+    pub(crate) arrival: Arrival,
     pub(crate) reply: Reply,
 }

@@ -63,6 +63,8 @@ pub enum Code {
     Ending,
     /// A file cannot be written or read.
     Storage,
+    /// No other Idempotency-Key can be remembered.
+    KeysFull,
     /// The configuration does not allow it.
     Configuration,
     /// A device or a bus.
@@ -128,8 +130,8 @@ impl Code {
             | Self::Silent
             | Self::Restarted
             | Self::Beam => 502,
-            Self::Busy | Self::Ending => 503,
-            Self::Storage => 507,
+            Self::Busy | Self::Ending | Self::Storage => 503,
+            Self::KeysFull => 507,
         }
     }
 
@@ -175,6 +177,7 @@ impl Code {
             | Self::NotOffered
             | Self::TooLarge
             | Self::Storage
+            | Self::KeysFull
             | Self::Configuration => 2,
         }
     }

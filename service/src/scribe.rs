@@ -1,7 +1,7 @@
-//! Writes down what happened, on a thread of its own: neither the machine nor a client waits for a disk.
+//! Writes down what happened, on threads of its own: neither the machine nor a client waits for a disk.
 //!
-//! How motions ended goes to the ledger, every event to `journal.jsonl` beside it, one JSON object a line. A
-//! journal that has grown large becomes `journal.old.jsonl`.
+//! One thread writes the ledger, and another one every event to `journal.jsonl` beside it, one JSON object a line: where
+//! one of them hangs, the other one goes on. A journal that has grown large becomes `journal.old.jsonl`.
 
 use core::time::Duration;
 use std::fs::{self, File, OpenOptions};
@@ -9,59 +9,97 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::{self, Thread};
+use std::time::Instant;
 
 use crate::desk::Desk;
+use crate::ledger::{WRITE_LIMIT, Writer};
 use crate::system_log::SystemLog;
 
-/// How often it looks: the snapshot keeps far more events than happen meanwhile.
+/// How often they look: the snapshot keeps far more events than happen meanwhile.
 const EVERY: Duration = Duration::from_millis(50);
 /// So large a journal may grow, in bytes.
 const JOURNAL_MAX: u64 = 16 << 20;
 
-/// The thread that writes.
+/// The threads that write.
 #[derive(Debug)]
 pub(crate) struct Scribe {
     over: Arc<AtomicBool>,
-    thread: JoinHandle<()>,
+    threads: Vec<(Thread, Receiver<()>)>,
 }
 
 impl Scribe {
-    /// Writes what `desk` reads into `folder`.
-    pub(crate) fn start(desk: Desk, folder: PathBuf) -> io::Result<Self> {
-        let over = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&over);
-        let thread = thread::Builder::new()
-            .name("scribe".into())
-            .spawn(move || {
-                let mut newest = 0;
-                let mut log = SystemLog::of_environment();
-                loop {
-                    let is_last = seen.load(Ordering::Acquire);
-                    // A disk that is full or gone must not end the service; the next look tries again.
-                    let _ = desk.write_ends();
-                    let _ = write_events(&desk, &folder, &mut newest);
-                    log.iter_mut().for_each(|it| it.tell(&desk));
-                    if is_last {
-                        return;
-                    }
-                    thread::park_timeout(EVERY);
-                }
-            })?;
-        Ok(Self { over, thread })
+    /// Writes what `desk` reads: by `writer` into the ledger, and events into `folder`.
+    pub(crate) fn start(desk: Desk, writer: Writer, folder: PathBuf) -> io::Result<Self> {
+        let mut scribe = Self {
+            over: Arc::default(),
+            threads: Vec::new(),
+        };
+        let events = desk.clone();
+        scribe.spawn("ledger", move |over| keep_ledger(&desk, writer, over))?;
+        scribe.spawn("scribe", move |over| keep_journal(&events, &folder, over))?;
+        Ok(scribe)
     }
 
-    /// Writes the rest and ends.
+    fn spawn(
+        &mut self,
+        name: &str,
+        work: impl FnOnce(&AtomicBool) + Send + 'static,
+    ) -> io::Result<()> {
+        let over = Arc::clone(&self.over);
+        let (open, ended): (Sender<()>, _) = mpsc::channel();
+        let builder = thread::Builder::new().name(name.into());
+        let thread = builder.spawn(move || {
+            let _open = open;
+            work(&over);
+        })?;
+        self.threads.push((thread.thread().clone(), ended));
+        Ok(())
+    }
+
+    /// Writes the rest and ends. A disk that hangs keeps nobody.
     pub(crate) fn finish(self) {
         self.over.store(true, Ordering::Release);
-        self.thread.thread().unpark();
-        let _ = self.thread.join();
+        let until = Instant::now() + WRITE_LIMIT;
+        for (thread, ended) in self.threads {
+            thread.unpark();
+            // Nothing is ever sent: either the thread has ended, or it is left behind.
+            let _ = ended.recv_timeout(until.saturating_duration_since(Instant::now()));
+        }
+    }
+}
+
+fn keep_ledger(desk: &Desk, mut writer: Writer, over: &AtomicBool) {
+    loop {
+        let is_last = over.load(Ordering::Acquire);
+        desk.note_ends();
+        writer.write();
+        if is_last {
+            return;
+        }
+        writer.await_news(EVERY);
+    }
+}
+
+fn keep_journal(desk: &Desk, folder: &Path, over: &AtomicBool) {
+    let mut newest = 0;
+    let mut log = SystemLog::of_environment();
+    loop {
+        let is_last = over.load(Ordering::Acquire);
+        log.iter_mut().for_each(|log| log.tell(desk));
+        // A disk that is full or gone must not end the service; the next look tries again.
+        let _ = write_events(desk, folder, &mut newest);
+        if is_last {
+            return;
+        }
+        thread::park_timeout(EVERY);
     }
 }
 
 fn write_events(desk: &Desk, folder: &Path, newest: &mut u64) -> io::Result<()> {
     let events = desk.events(*newest);
-    let Some(last) = events.last().map(|it| it.id) else {
+    let Some(last) = events.last().map(|event| event.id) else {
         return Ok(());
     };
     let mut bytes = Vec::new();
@@ -76,7 +114,7 @@ fn write_events(desk: &Desk, folder: &Path, newest: &mut u64) -> io::Result<()> 
 
 fn journal(folder: &Path) -> io::Result<File> {
     let path = folder.join("journal.jsonl");
-    let is_large = fs::metadata(&path).is_ok_and(|it| it.len() > JOURNAL_MAX);
+    let is_large = fs::metadata(&path).is_ok_and(|found| found.len() > JOURNAL_MAX);
     if is_large {
         fs::rename(&path, folder.join("journal.old.jsonl"))?;
     }

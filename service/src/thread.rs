@@ -8,11 +8,12 @@ use std::cell::RefCell;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use machine::attend;
+use machine::records::files::{Files, os_files};
 use machine::records::{AnyLog, Store, read_journal};
 use triple_buffer::Input;
 use truestage::runs::{Choice, Found, Group, Teller};
@@ -28,6 +29,7 @@ use crate::problem::Problem;
 use crate::request::RunKind;
 use crate::scribe::Scribe;
 use crate::snapshot::{Board, CalibrationInUse, Fixed, Snapshot};
+use crate::stops::{StopWatch, Stops};
 
 /// So many orders may wait for the next tick.
 const QUEUE: usize = 64;
@@ -83,19 +85,34 @@ impl Service {
     pub fn start(
         open: impl FnOnce() -> Result<Opened, Failure> + Send + 'static,
     ) -> Result<Self, StartError> {
+        Self::start_with(os_files(), open)
+    }
+
+    /// [`Service::start`] with the disk `files` for what was asked for.
+    ///
+    /// # Errors
+    /// Those of [`Service::start`].
+    pub fn start_with(
+        files: Arc<dyn Files>,
+        open: impl FnOnce() -> Result<Opened, Failure> + Send + 'static,
+    ) -> Result<Self, StartError> {
+        let (stops, watch) = Stops::new();
         let (letters, inbox) = mpsc::sync_channel(QUEUE);
         let (input, output) = triple_buffer::triple_buffer(&Snapshot::before());
         let (told, ready) = mpsc::channel();
         let thread = thread::Builder::new()
             .name("machine".into())
-            .spawn(move || keep(open, inbox, input, &told))?;
+            .spawn(move || keep(open, (inbox, watch), input, &told))?;
         match ready.recv() {
             Ok((fixed, store, of_desk)) => {
                 let folder = store.root().join("service");
-                let ledger = Ledger::open(&folder)?;
-                let desk = Desk::new(letters, Board::new(output), fixed, ledger, store, of_desk);
+                let (ledger, writer) = Ledger::open(files, &folder)?;
+                let warnings = ledger.warnings.clone();
+                let board = Board::new(output);
+                let desk = Desk::new((letters, stops), board, fixed, ledger, store, of_desk);
+                desk.warn(warnings);
                 Ok(Self {
-                    scribe: Scribe::start(desk.clone(), folder)?,
+                    scribe: Scribe::start(desk.clone(), writer, folder)?,
                     desk,
                     watch: None,
                     thread,
@@ -148,7 +165,7 @@ type Told = Sender<(Arc<Fixed>, Store, (Option<Page>, Judges))>;
 /// All that the machine's thread does.
 fn keep(
     open: impl FnOnce() -> Result<Opened, Failure>,
-    inbox: Receiver<Letter>,
+    (inbox, stops): (Receiver<Letter>, StopWatch),
     input: Input<Snapshot>,
     told: &Told,
 ) -> Result<(), Failure> {
@@ -161,8 +178,8 @@ fn keep(
     let groups = groups(machine.config());
     let fixed = Arc::new(fixed(&mut machine, &groups)?);
     let seats = seats(&mut machine, &groups)?;
-    let judges = judges(&mut machine, &groups)?;
-    let mut keeper = Keeper::new(inbox, input, seats, teller.clone());
+    let judges = Judges::of(&mut machine, &groups)?;
+    let mut keeper = Keeper::new(inbox, stops, input, seats, teller.clone());
     keeper.add_groups(&mut machine, groups);
     machine.observe(Box::new(keeper.note_taker()));
     let keeper = Rc::new(RefCell::new(keeper));
@@ -191,22 +208,6 @@ fn keep(
     kept.keeper.borrow_mut().dismiss();
     drop(held);
     ended
-}
-
-/// Who judges paths and jobs of `machine`.
-fn judges(machine: &mut Machine, groups: &[Group]) -> Result<Judges, Failure> {
-    let mut judges = Judges::default();
-    for group in groups {
-        if let Some(judge) = group.path_judge(machine)? {
-            let judge = Mutex::new(judge);
-            judges.paths.push((group.name.clone(), judge));
-        }
-        // A job says itself which axis does it.
-        if judges.jobs.is_none() {
-            judges.jobs = group.job_judge(machine).map(Mutex::new);
-        }
-    }
-    Ok(judges)
 }
 
 /// A machine that is kept.

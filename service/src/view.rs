@@ -7,11 +7,15 @@ use truestage::runs::JudgedPath;
 use utoipa::ToSchema;
 
 mod chosen;
+mod ending;
 mod event;
+mod storage;
 mod told;
 
 pub use chosen::{CalibrationView, ChangeView, ChosenView};
+pub(crate) use ending::Ending;
 pub use event::Event;
+pub use storage::StorageView;
 pub use told::{StoredView, ToldView};
 
 use crate::problem::Code;
@@ -228,6 +232,9 @@ pub struct MotionView {
     /// How axes that have moved as one ended, as the command line prints it, when it is done.
     #[serde(default)]
     pub told: Option<ToldView>,
+    /// Whether its end is on the disk: a restart does not change it any more. Left out before its end, and of a jog.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept: Option<bool>,
 }
 
 /// What one axis does in a motion.
@@ -403,6 +410,10 @@ pub struct RunView {
     /// Where what it measured is, once it has ended; of one without a result, as far as it can go on with that.
     #[serde(default)]
     pub journal: Option<String>,
+    /// Whether its end is on the disk: a restart does not change it any more. Left out before its end, and of a run that was
+    /// asked for without a key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept: Option<bool>,
 }
 
 /// What a run asks a person, and how that can be answered (`POST /v1/runs/{id}/answers`).
@@ -458,6 +469,7 @@ impl RunView {
             stored: Vec::new(),
             made_worse: false,
             journal: None,
+            kept: None,
         }
     }
 

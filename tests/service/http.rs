@@ -125,7 +125,7 @@ impl Http {
         }
     }
 
-    fn post(&self, who: &Caller, path: &str, more: &str, body: &Value) -> Answer {
+    pub(crate) fn post(&self, who: &Caller, path: &str, more: &str, body: &Value) -> Answer {
         let lease = who.lease.as_ref();
         let lease = lease.map_or(String::new(), |it| format!("\r\ntruestage-lease: {it}"));
         let name = &who.name;

@@ -2,10 +2,12 @@
 
 mod client;
 mod contract;
+mod disk;
 mod edge;
 mod flood;
 mod http;
 mod metrics;
 mod network;
 mod stage;
+mod storage;
 mod strangers;

@@ -439,17 +439,17 @@ fn a_slip_in_the_file_of_tokens_takes_the_stop_from_nobody_and_is_told() {
         let path = files.path("tokens.toml");
         let good = fs::read_to_string(&path).unwrap();
         fs::write(&path, format!("{good}\n[[token]]\nname = \"otto\"\n")).unwrap();
-        wait_for(&net, &files.tokens[0], 507);
+        wait_for(&net, &files.tokens[0], 503);
         for (token, role) in files.tokens.iter().zip(ROLES) {
             let stop = net.ask("POST /v1/stop", &bearer(token), &Value::Null);
             assert_eq!(stop.status, 200, "{role}: {}", stop.body);
             for line in ["GET /v1/machine", "POST /v1/reset"] {
                 let other = net.ask(line, &bearer(token), &Value::Null);
-                assert_eq!(other.status, 507, "{line} {role}: {}", other.body);
+                assert_eq!(other.status, 503, "{line} {role}: {}", other.body);
             }
         }
         let stranger = net.ask("POST /v1/stop", &bearer("0a1b"), &Value::Null);
-        assert_eq!(stranger.status, 507, "{}", stranger.body);
+        assert_eq!(stranger.status, 503, "{}", stranger.body);
         let warnings = || {
             let _passing = stage.gate.pass();
             let events = stage.desk.events(0).into_iter();

@@ -7,6 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use core::time::Duration;
 
 use drivers::transport::{SendError, Transport};
+use machine::records::files::{Files, os_files};
 use mock_bus::fault::{Fault, FaultConfig, FaultId};
 use mock_bus::simulation::Simulation;
 use service::{Desk, Opened, Service};
@@ -266,7 +267,7 @@ impl Stage {
         let loaded = shipped_config(&shipped, folder, change);
         let text = shipped.emulated;
         let emulated = match rig {
-            Rig::InProcess => return Self::in_process(loaded, text, seed),
+            Rig::InProcess => return Self::in_process(os_files(), loaded, text, seed),
             Rig::Pty => EmulatedOnPtys::in_lockstep(text, seed),
             Rig::Vcan => EmulatedOnPtys::in_lockstep_on_socketcan(text, seed, "vcan0"),
         };
@@ -276,14 +277,25 @@ impl Stage {
         )
     }
 
-    fn in_process(loaded: Loaded, text: &'static str, seed: u64) -> Self {
+    /// The machine `shipped` in this process, with `files` as the disk of its ledger.
+    pub(crate) fn on_disk(
+        files: Arc<dyn Files>,
+        (shipped, seed): (Shipped, u64),
+        folder: &Path,
+        change: impl Fn(String) -> String,
+    ) -> Self {
+        let loaded = shipped_config(&shipped, folder, change);
+        Self::in_process(files, loaded, shipped.emulated, seed)
+    }
+
+    fn in_process(files: Arc<dyn Files>, loaded: Loaded, text: &'static str, seed: u64) -> Self {
         let (meddling, received) = channel();
         let open = move |loaded: &Loaded| {
             let emulated = Emulated::new(text, seed, &loaded.config)?;
             let transport: Box<dyn Transport> = Box::new(emulated.transport());
             Ok((transport, Some((emulated, received))))
         };
-        Self::start(loaded, open, Place::InProcess(meddling))
+        Self::start(files, loaded, open, Place::InProcess(meddling))
     }
 
     fn on_ptys(mut loaded: Loaded, emulated: EmulatedOnPtys) -> Self {
@@ -296,10 +308,10 @@ impl Stage {
             let transport: Box<dyn Transport> = Box::new(live);
             Ok((transport, None))
         };
-        Self::start(loaded, open, Place::Running(Box::new(emulated)))
+        Self::start(os_files(), loaded, open, Place::Running(Box::new(emulated)))
     }
 
-    fn start<O>(loaded: Loaded, open: O, place: Place) -> Self
+    fn start<O>(files: Arc<dyn Files>, loaded: Loaded, open: O, place: Place) -> Self
     where
         O: FnOnce(&Loaded) -> Result<OpenedTransport, Failure> + Send + 'static,
     {
@@ -309,7 +321,7 @@ impl Stage {
         let inner_gate = Arc::clone(&gate);
         let store = loaded.config.machine.store();
         let passing = gate.wait_for_an_end();
-        let service = Service::start(move || {
+        let service = Service::start_with(files, move || {
             let (inner, meddling) = open(&loaded)?;
             let transport = Gated {
                 inner,

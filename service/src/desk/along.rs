@@ -4,8 +4,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use machine::engine::Join;
-use truestage::Failure;
-use truestage::runs::{AskedJob, JobJudge, PathJudge};
+use truestage::runs::{AskedJob, Group, JobJudge, PathJudge};
+use truestage::{Failure, Machine};
 
 use super::Desk;
 use crate::order::Judged;
@@ -19,6 +19,24 @@ pub(crate) struct Judges {
     pub(crate) paths: Vec<(String, Mutex<PathJudge>)>,
     /// Of jobs of any axis.
     pub(crate) jobs: Option<Mutex<JobJudge>>,
+}
+
+impl Judges {
+    /// Those of `machine`.
+    pub(crate) fn of(machine: &mut Machine, groups: &[Group]) -> Result<Self, Failure> {
+        let mut judges = Self::default();
+        for group in groups {
+            if let Some(judge) = group.path_judge(machine)? {
+                let judge = Mutex::new(judge);
+                judges.paths.push((group.name.clone(), judge));
+            }
+            // A job says itself which axis does it.
+            if judges.jobs.is_none() {
+                judges.jobs = group.job_judge(machine).map(Mutex::new);
+            }
+        }
+        Ok(judges)
+    }
 }
 
 /// So long may a path take, in seconds: its points wait in memory.

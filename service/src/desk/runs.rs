@@ -1,11 +1,10 @@
 //! Runs: planned, started, paused, awaited.
 
 use core::time::Duration;
-use std::thread;
-use std::time::Instant;
+use std::sync::Arc;
 
-use super::{Desk, LOOK_EVERY, Noted, key_reused, storage};
-use crate::ledger::AskedRun;
+use super::{Desk, await_end};
+use crate::ledger::{Asked, AskedRun, End, Noted};
 use crate::order::{Judged, Order};
 use crate::problem::{Code, Problem};
 use crate::request::{AnswerRequest, Caller, RunRequest};
@@ -32,10 +31,11 @@ impl Desk {
         request: &RunRequest,
         key: Option<&str>,
     ) -> Result<String, Problem> {
+        let arrival = self.stops().arrival();
         match self.prepare_run(caller, request, key)? {
             Prepared::Before(id) => Ok(id),
             Prepared::New(id, order) => {
-                let planned = self.done(caller, *order);
+                let planned = self.done_since(arrival, caller, *order);
                 self.settle_run(id, key, planned)
             }
         }
@@ -48,10 +48,10 @@ impl Desk {
         request: &RunRequest,
         key: Option<&str>,
     ) -> Result<Prepared, Problem> {
-        let id = match self.note_run(caller, request, key)? {
-            Noted::Before(id) => return Ok(Prepared::Before(id)),
-            Noted::New(id) => id,
-        };
+        let (id, noted) = self.note_run(caller, request, key)?;
+        if let Noted::Before(id) = noted {
+            return Ok(Prepared::Before(id));
+        }
         match self.judge_run(request) {
             Ok(judged) => {
                 let order = Self::plan_order(&id, request, judged);
@@ -61,30 +61,21 @@ impl Desk {
         }
     }
 
-    /// Notes a request with a key that was not made before.
+    /// Looks whether a request with a key was made before, and notes it when it was not. Waits for the disk.
     fn note_run(
         &self,
         caller: &Caller,
         request: &RunRequest,
         key: Option<&str>,
-    ) -> Result<Noted, Problem> {
-        let mut ledger = self.ledger();
-        let id = ledger.next_id('r');
+    ) -> Result<(String, Noted), Problem> {
+        let id = self.ledger().next_id('r');
         let Some(key) = key else {
-            return Ok(Noted::New(id));
+            self.ledger().require_storage()?;
+            return Ok((id, Noted::New));
         };
-        if let Some(before) = ledger.run_of_key(key) {
-            return match before.is(request) {
-                true => Ok(Noted::Before(before.id.clone())),
-                false => Err(key_reused(&format!("run {}", before.id))),
-            };
-        }
-        if let Some(motion) = ledger.of_key(key) {
-            return Err(key_reused(&format!("motion {}", motion.id)));
-        }
         let asked = AskedRun::now(&id, key, &caller.name, request);
-        ledger.ask_run(asked).map_err(|it| storage(&it))?;
-        Ok(Noted::New(id))
+        let noted = self.ledger().note(Asked::Run(asked))?;
+        Ok((id, noted))
     }
 
     /// What became of the order of a run.
@@ -127,8 +118,14 @@ impl Desk {
     /// # Errors
     /// When it is not planned any more, or an axis is in use.
     pub fn start_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
+        self.require_storage()?;
         let run = id.to_owned();
         self.done(caller, Order::Start { run })
+    }
+
+    /// Refuses what needs a disk.
+    pub(crate) fn require_storage(&self) -> Result<(), Problem> {
+        self.ledger().require_storage()
     }
 
     /// Ends the run `id`.
@@ -154,6 +151,7 @@ impl Desk {
     /// # Errors
     /// When there is none, it cannot go on, an axis is in use or has no zero.
     pub fn resume_run(&self, caller: &Caller, id: &str) -> Result<(), Problem> {
+        self.require_storage()?;
         let run = id.to_owned();
         self.done(caller, Order::Resume { run })
     }
@@ -185,8 +183,8 @@ impl Desk {
     /// When there is none.
     pub fn run(&self, id: &str) -> Result<RunView, Problem> {
         let snapshot = self.snapshot();
-        let found = snapshot.runs.iter().find(|it| it.id == *id);
-        let found = found.map(|it| RunView::clone(it));
+        let found = snapshot.runs.iter().find(|view| view.id == *id);
+        let found = found.map(|view| self.run_with_kept(view));
         found
             .or_else(|| self.ledger().run(id))
             .ok_or_else(|| Problem::new(Code::NoSuchRun, format!("there is no run {id}"), ""))
@@ -197,19 +195,22 @@ impl Desk {
     /// # Errors
     /// When there is none.
     pub fn wait_run(&self, id: &str, limit: Duration) -> Result<RunView, Problem> {
-        let begun = Instant::now();
-        loop {
-            let view = self.run(id)?;
-            if view.state.is_end() || begun.elapsed() >= limit {
-                return Ok(view);
-            }
-            thread::sleep(LOOK_EVERY);
+        await_end(limit, || self.run(id))
+    }
+
+    /// A run of a snapshot. Its end goes to the disk at once.
+    fn run_with_kept(&self, view: &Arc<RunView>) -> RunView {
+        let ended = view.state.is_end().then(|| End::Run(Arc::clone(view)));
+        RunView {
+            kept: ended.and_then(|end| self.ledger().end(end)),
+            ..RunView::clone(view)
         }
     }
 
     /// The runs that are known.
     pub fn runs(&self) -> Vec<RunView> {
         let snapshot = self.snapshot();
-        snapshot.runs.iter().map(|it| RunView::clone(it)).collect()
+        let runs = snapshot.runs.iter();
+        runs.map(|view| self.run_with_kept(view)).collect()
     }
 }

@@ -1,6 +1,8 @@
 //! Who is let in, and what is taken from a request.
 
+use core::convert::Infallible;
 use core::time::Duration;
+use std::sync::Arc;
 
 use axum::Json;
 use axum::body::{Bytes, HttpBody};
@@ -19,9 +21,12 @@ use super::identity::{Admitted, Identities, STOP};
 use super::needs::{enough, needed};
 use super::place::Listen;
 use super::places::Keeps;
+use super::state::State as Shared;
 use crate::access::Access;
+use crate::keeper::stopped_by;
 use crate::problem::{Code, Problem};
 use crate::request::Caller;
+use crate::stops::{Arrival, Stops};
 
 /// So large a request may be, in bytes.
 const BODY_MAX: usize = 64 << 10;
@@ -87,10 +92,11 @@ enum Pages {
 pub(super) struct Guarded {
     pages: Pages,
     identities: Identities,
+    stops: Arc<Stops>,
 }
 
 impl Guarded {
-    pub(super) fn new(place: &Listen, access: &Access) -> Self {
+    pub(super) fn new(place: &Listen, access: &Access, stops: &Arc<Stops>) -> Self {
         let (pages, is_beyond) = match place {
             Listen::Unix(_) => (Pages::None, false),
             Listen::Tcp(_) => (Pages::OfThisComputer, false),
@@ -99,6 +105,7 @@ impl Guarded {
         Self {
             pages,
             identities: Identities::new(access, is_beyond),
+            stops: Arc::clone(stops),
         }
     }
 
@@ -119,14 +126,21 @@ pub(super) async fn guard(
     request: Request,
     next: Next,
 ) -> Response {
+    // What stops from here on is a stop of this request, however long its body takes.
+    let arrival = guarded.stops.arrival();
     let admitted = guarded.admit(&request);
     let (mut parts, body) = request.into_parts();
+    parts.extensions.insert(Arrived(arrival));
     // Who is answered before he has said all may never hear it.
     let most = match admitted.is_ok() && parts.uri.path() == "/v1/runs" {
         true => PATH_MAX,
         false => BODY_MAX,
     };
     let is_stop = parts.method == Method::POST && parts.uri.path() == STOP;
+    if is_stop && let Ok(admitted) = &admitted {
+        parts.extensions.insert(admitted.clone());
+        guarded.stops.arrive(stopped_by(By::of(&parts).0.name));
+    }
     let limit = if is_stop { STOP_TIME } else { BODY_TIME };
     let whole = timeout(limit, whole(body, most)).await;
     let mut whole = whole.unwrap_or_else(|_| {
@@ -232,11 +246,30 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
+        Ok(Self::of(parts))
+    }
+}
+
+impl By {
+    fn of(parts: &Parts) -> Self {
         let text = |name: &str| parts.headers.get(name).and_then(|it| it.to_str().ok());
         let said = text(CLIENT).unwrap_or_default();
         let name = Known::of(parts).called(said);
         let lease = text(LEASE).map(str::to_owned);
-        Ok(Self(Caller { name, lease }))
+        Self(Caller { name, lease })
+    }
+}
+
+/// When a request arrived, before its body was heard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrived(pub(super) Arrival);
+
+impl FromRequestParts<Shared> for Arrived {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, state: &Shared) -> Result<Self, Infallible> {
+        let known = parts.extensions.get::<Self>().copied();
+        Ok(known.unwrap_or_else(|| Self(state.desk.stops().arrival())))
     }
 }
 

@@ -52,7 +52,7 @@ fn write(text: &mut String, (name, what, kind, samples): Figure) {
     }
 }
 
-fn machine_figures(desk: &Desk) -> [Figure; 4] {
+fn machine_figures(desk: &Desk) -> [Figure; 6] {
     let machine = desk.machine();
     let only = |value: f64| vec![(String::new(), value)];
     let is_running = machine.state == MachineState::Running;
@@ -62,6 +62,18 @@ fn machine_figures(desk: &Desk) -> [Figure; 4] {
             "Whether the machine is supervised and carries orders out.",
             "gauge",
             only(f64::from(u8::from(is_running))),
+        ),
+        (
+            "truestage_storage_ok",
+            "Whether motions and runs can be written down, and are taken.",
+            "gauge",
+            only(f64::from(u8::from(desk.storage().ok))),
+        ),
+        (
+            "truestage_idempotency_keys",
+            "Idempotency-Keys that are remembered; 100000 are.",
+            "gauge",
+            only(desk.keys() as f64),
         ),
         (
             "truestage_clock_seconds",

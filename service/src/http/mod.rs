@@ -61,7 +61,8 @@ impl Edge {
                 tokio::spawn(tokens::watch(known, desk.clone(), closing.clone()));
             }
             let state = State::new(desk.clone(), closing);
-            routes::router(state, Guarded::new(place, access))
+            let guarded = Guarded::new(place, access, desk.stops());
+            routes::router(state, guarded)
         })
     }
 

@@ -26,9 +26,12 @@ use super::page::page;
 use super::state::State;
 use super::{events, metrics};
 use crate::desk::Desk;
+use crate::ledger::WRITE_LIMIT;
 use crate::order::{Answer, Order};
 use crate::problem::{Code, Problem};
 use crate::request::Caller;
+use crate::stops::Arrival;
+use crate::view::{Ending, StorageView};
 
 /// The longest that an answer is held back for an end.
 const WAIT_MAX: Duration = Duration::from_secs(300);
@@ -73,6 +76,7 @@ fn routed() -> (Router<State>, OpenApi) {
         .routes(routes!(machine::stop))
         .routes(routes!(machine::reset))
         .routes(routes!(machine::lease, machine::release))
+        .routes(routes!(machine::accept_ledger))
         .routes(routes!(motions::motions, motions::begin))
         .routes(routes!(motions::motion))
         .routes(routes!(motions::renew))
@@ -159,6 +163,8 @@ pub(super) fn router(state: State, guarded: Guarded) -> Router {
 struct Health {
     /// What the machine is.
     state: crate::view::MachineState,
+    /// The disk that motions and runs are written to before they begin.
+    storage: StorageView,
 }
 
 /// Whether the service is alive, and what the machine is.
@@ -167,8 +173,11 @@ struct Health {
     responses((status = 200, description = "It is", body = Health))
 )]
 async fn healthz(axum::extract::State(state): axum::extract::State<State>) -> Json<Health> {
-    let state = state.desk.machine().state;
-    Json(Health { state })
+    let desk = &state.desk;
+    Json(Health {
+        state: desk.machine().state,
+        storage: desk.storage(),
+    })
 }
 
 /// How long an answer may be held back.
@@ -182,11 +191,10 @@ pub(super) struct Wait {
 }
 
 impl Wait {
-    /// Asks until it has ended or the time is over.
-    pub(super) async fn until<T>(
+    /// Asks until the end is on the disk or the time is over; once it has ended, no longer than a write may take.
+    pub(super) async fn until<T: Ending>(
         self,
         ask: impl Fn() -> Result<T, Problem>,
-        has_ended: impl Fn(&T) -> bool,
     ) -> Result<T, Problem> {
         let wait_s = self.wait_s.unwrap_or_default();
         // Written so that NaN is refused too.
@@ -196,9 +204,12 @@ impl Wait {
             return Err(Problem::new(Code::BadRequest, what, help));
         }
         let limit = tokio::time::Instant::now() + Duration::from_secs_f64(wait_s);
+        let mut ended = None;
         loop {
-            let asked = ask()?;
-            if has_ended(&asked) || tokio::time::Instant::now() >= limit {
+            let (asked, now) = (ask()?, tokio::time::Instant::now());
+            let is_over = asked.has_ended()
+                && (!asked.waits_for_disk() || now >= *ended.get_or_insert(now + WRITE_LIMIT));
+            if is_over || now >= limit {
                 return Ok(asked);
             }
             tokio::time::sleep(LOOK_EVERY).await;
@@ -232,6 +243,16 @@ pub(super) async fn obey_at_last(
         }
     }
     obey(desk, caller, order).await
+}
+
+/// Gives an order that arrived then, and waits for its answer.
+pub(super) async fn obey_since(
+    arrival: Arrival,
+    desk: &Desk,
+    caller: &Caller,
+    order: Order,
+) -> Result<Answer, Problem> {
+    desk.give_since(arrival, caller, order)?.answer().await
 }
 
 /// Gives an order and waits for its answer, without keeping anybody else waiting.

@@ -28,6 +28,7 @@ use truestage::runs::{Choice, Teller};
 use crate::figures::Book;
 use crate::order::{Answered, Letter, Reply};
 use crate::snapshot::Snapshot;
+use crate::stops::StopWatch;
 use crate::view::Cause;
 use events::Events;
 pub(crate) use events::utc_now;
@@ -40,7 +41,7 @@ use run::Runs;
 pub(crate) use run::Task as RunTask;
 pub(crate) use seat::Seat;
 pub(crate) use setup::{fixed, seats};
-pub(crate) use stop::cause_of;
+pub(crate) use stop::{cause_of, stopped_by};
 
 /// So many orders are taken after one tick: the others wait for the next.
 const ORDERS_A_TICK: usize = 16;
@@ -105,6 +106,7 @@ impl Observer for NoteTaker {
 /// Everything that the service knows, on the machine's thread.
 pub(crate) struct Keeper {
     inbox: Receiver<Letter>,
+    stops: StopWatch,
     seats: Vec<Seat>,
     groups: Vec<Grouped>,
     motions: Motions,
@@ -130,12 +132,14 @@ pub(crate) struct Keeper {
 impl Keeper {
     pub(crate) fn new(
         inbox: Receiver<Letter>,
+        stops: StopWatch,
         output: Input<Snapshot>,
         seats: Vec<Seat>,
         teller: Option<Teller>,
     ) -> Self {
         Self {
             inbox,
+            stops,
             seats,
             groups: Vec::new(),
             motions: Motions::default(),
@@ -268,6 +272,8 @@ impl Keeper {
 
     /// After a reset: nothing is known of where things are.
     pub(crate) fn recovered(&mut self, machine: &Machine) {
+        // What was asked for before the failure does not begin after it.
+        self.stops.void_all(stopped_by("a reset"));
         self.fault = None;
         for seat in &mut self.seats {
             seat.task = seat::Task::Free;

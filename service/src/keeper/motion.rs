@@ -442,6 +442,11 @@ impl Keeper {
                 seat.last_cause.clone_from(&cause);
             }
         }
+        self.keep_end(view);
+    }
+
+    /// Shows an end, and tells it.
+    fn keep_end(&mut self, view: Arc<MotionView>) {
         self.events.push("motion", &view.id, json!(&*view));
         self.motions.ended.push_back(view);
         if self.motions.ended.len() > ENDED_KEPT {

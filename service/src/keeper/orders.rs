@@ -6,10 +6,11 @@ use machine::{Driving, Machine};
 use truestage::runs::{Change, Choice, Group};
 
 use super::seat::Task;
-use super::stop::stopped_problem;
+use super::stop::{stopped_problem, voided};
 use super::{Job, Keeper, Mode};
 use crate::order::{Answer, Answered, Letter, Order, Reply};
 use crate::problem::{Code, Problem};
+use crate::view::Stopped;
 
 impl Keeper {
     /// Carries an order out, or begins to.
@@ -17,6 +18,7 @@ impl Keeper {
         let Letter {
             order,
             caller,
+            arrival,
             reply,
         } = letter;
         let allowed = match order.needs_lease() {
@@ -28,6 +30,13 @@ impl Keeper {
             return;
         }
         let by = caller.name.as_str();
+        if order.is_voided_by_stop()
+            && let Some(stopped) = self.stops.after(arrival)
+        {
+            let answered = self.void(machine, order, by, stopped);
+            self.answer_later(reply, answered);
+            return;
+        }
         let answered = match order {
             Order::Stop { mode } => {
                 self.stop(machine, mode, by);
@@ -71,6 +80,26 @@ impl Keeper {
             Order::End => return self.take_end(machine, by, reply),
         };
         self.answer_later(reply, answered);
+    }
+
+    /// What became of an order that arrived before a stop: a motion or run that has a name ends as stopped, and all else
+    /// is refused.
+    fn void(&mut self, machine: &Machine, order: Order, by: &str, stopped: Stopped) -> Answered {
+        match order {
+            Order::Move { id, request } => {
+                self.void_motion(machine, (&id, by), &request, stopped)?
+            }
+            Order::Plan {
+                id,
+                request,
+                judged,
+            } => {
+                self.plan_run(&id, by, &request, judged)?;
+                self.end_planned(&id, stopped);
+            }
+            _ => return Err(voided(&stopped)),
+        }
+        Ok(Answer::Done)
     }
 
     /// The number of the axis `name`.

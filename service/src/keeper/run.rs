@@ -171,10 +171,7 @@ impl Keeper {
         let run = self.runs.find(id)?;
         let stopped = stopped_by(by);
         match run.view.state {
-            RunState::Planned | RunState::Paused => self.change_run(id, |view| {
-                view.state = RunState::Stopped;
-                view.stopped = Some(stopped);
-            }),
+            RunState::Planned | RunState::Paused => self.end_planned(id, stopped),
             RunState::Running => self.stop_run(machine, &stopped),
             // A level: it stays.
             RunState::Stopping
@@ -184,6 +181,14 @@ impl Keeper {
             | RunState::TimedOut => {}
         }
         Ok(())
+    }
+
+    /// The run `id`, which is not under way, ends as stopped.
+    pub(super) fn end_planned(&mut self, id: &str, stopped: Stopped) {
+        self.change_run(id, |view| {
+            view.state = RunState::Stopped;
+            view.stopped = Some(stopped);
+        });
     }
 
     /// The run that is under way is stopped.

@@ -138,11 +138,17 @@ pub(crate) fn cause_of(failure: &truestage::Failure) -> Cause {
 }
 
 /// That `who` stopped something, now.
-pub(super) fn stopped_by(who: impl Into<String>) -> Stopped {
+pub(crate) fn stopped_by(who: impl Into<String>) -> Stopped {
     Stopped {
         by: who.into(),
         at: utc_now(),
     }
+}
+
+/// That `stopped` voids an order.
+pub(super) fn voided(stopped: &Stopped) -> Problem {
+    let what = format!("stopped by {} before it began", stopped.by);
+    Problem::new(Code::Stopped, what, "ask again where it is still wanted")
 }
 
 pub(super) fn stopped_problem() -> Problem {

@@ -53,6 +53,12 @@ pub trait Files: Debug + Send + Sync {
     /// Those of the operating system.
     fn mode(&self, path: &Path) -> io::Result<u32>;
 
+    /// What tells `path` from a copy of it, where the system knows that. A new name changes nothing.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    fn identity(&self, path: &Path) -> io::Result<Option<String>>;
+
     /// Gives `from` the name `to`; what had that name is gone.
     ///
     /// # Errors

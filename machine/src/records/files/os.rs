@@ -2,8 +2,9 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
-use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
 
 use super::{Files, OpenFile};
 
@@ -58,6 +59,14 @@ impl Files for OsFiles {
 
     fn mode(&self, path: &Path) -> io::Result<u32> {
         Ok(fs::metadata(path)?.permissions().mode() & 0o7777)
+    }
+
+    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
+        let metadata = fs::metadata(path)?;
+        // Numbers of files are given again; with the time of birth they are not. Not every file system knows that.
+        let born = metadata.created().ok();
+        let born = born.and_then(|at| at.duration_since(UNIX_EPOCH).ok());
+        Ok(born.map(|at| format!("{}-{}", metadata.ino(), at.as_nanos())))
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {

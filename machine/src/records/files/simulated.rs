@@ -294,6 +294,11 @@ impl Files for SimulatedFiles {
         Ok(self.disk().file(path)?.1)
     }
 
+    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
+        let (content, _) = self.disk().file(path)?;
+        Ok(Some(content.to_string()))
+    }
+
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         let mut disk = self.disk();
         disk.begin_whole_call()?;

@@ -6,10 +6,10 @@ use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::super::guard::{Asks, Body, By, Known, NAME_MAX, Named, Unheard, plain};
+use super::super::guard::{Arrived, Asks, Body, By, Known, NAME_MAX, Named, Unheard, plain};
 use super::super::state::State;
 use super::stops::{StopDone, StopRequest, understood};
-use super::{obey, obey_at_last};
+use super::{obey, obey_at_last, obey_since};
 use crate::desk::Desk;
 use crate::order::{Answer, Order};
 use crate::problem::{Code, Problem, ProblemBody};
@@ -61,9 +61,15 @@ pub(super) async fn axis(
 pub(super) async fn enable(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     Named(axis): Named,
 ) -> Result<Json<AxisView>, Problem> {
-    power(&state.desk, caller, axis, true).await
+    let order = Order::Power {
+        axis: axis.clone(),
+        on: true,
+    };
+    obey_since(arrival, &state.desk, &caller, order).await?;
+    Ok(Json(state.desk.axis(&axis)?))
 }
 
 /// Switches an axis off.
@@ -78,23 +84,15 @@ pub(super) async fn enable(
 pub(super) async fn disable(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     Named(axis): Named,
-) -> Result<Json<AxisView>, Problem> {
-    power(&state.desk, caller, axis, false).await
-}
-
-async fn power(
-    desk: &Desk,
-    caller: crate::request::Caller,
-    axis: String,
-    on: bool,
 ) -> Result<Json<AxisView>, Problem> {
     let order = Order::Power {
         axis: axis.clone(),
-        on,
+        on: false,
     };
-    obey(desk, &caller, order).await?;
-    Ok(Json(desk.axis(&axis)?))
+    obey_since(arrival, &state.desk, &caller, order).await?;
+    Ok(Json(state.desk.axis(&axis)?))
 }
 
 /// That it was done.
@@ -146,8 +144,9 @@ pub(super) async fn stop(
 pub(super) async fn reset(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
 ) -> Result<Json<MachineView>, Problem> {
-    obey(&state.desk, &caller, Order::Reset).await?;
+    obey_since(arrival, &state.desk, &caller, Order::Reset).await?;
     Ok(Json(state.desk.machine()))
 }
 
@@ -199,5 +198,27 @@ pub(super) async fn lease(
 )]
 pub(super) async fn release(Of(state): Of<State>, By(caller): By) -> Result<Json<Done>, Problem> {
     obey(&state.desk, &caller, Order::Release).await?;
+    Ok(DONE)
+}
+
+/// Accepts that part of the ledger could not be read at the start: requests with a key are taken again. Those that stood there
+/// would move again.
+#[utoipa::path(
+    post, path = "/ledger/accept", tag = "service", params(Asks),
+    responses(
+        (status = 200, description = "It is accepted, also when nothing was damaged", body = Done),
+        (status = "4XX", description = "Not let in", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", description = "It cannot be written", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(super) async fn accept_ledger(
+    Of(state): Of<State>,
+    By(caller): By,
+) -> Result<Json<Done>, Problem> {
+    let desk = state.desk;
+    // It waits for the disk: others are served meanwhile.
+    let accepting = tokio::task::spawn_blocking(move || desk.accept_damaged_ledger(&caller));
+    let accepted = accepting.await;
+    accepted.map_err(|error| Problem::new(Code::Storage, error.to_string(), ""))??;
     Ok(DONE)
 }

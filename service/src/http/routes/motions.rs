@@ -5,10 +5,11 @@ use axum::extract::State as Of;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::super::guard::{Asks, Body, By, Named, has_key, key_of};
+use super::super::guard::{Arrived, Asks, Body, By, Named, has_key, key_of};
 use super::super::state::State;
-use super::{MaybeQuery, Wait, obey, query};
-use crate::desk::{Noted, named};
+use super::{MaybeQuery, Wait, obey, obey_since, query};
+use crate::desk::named;
+use crate::ledger::Noted;
 use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
 use crate::request::{JogRequest, MoveRequest};
@@ -37,6 +38,7 @@ pub(super) async fn motions(Of(state): Of<State>) -> Json<Vec<MotionView>> {
 pub(super) async fn begin(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     headers: HeaderMap,
     Body(request): Body<MoveRequest>,
 ) -> Result<impl IntoResponse, Problem> {
@@ -50,13 +52,14 @@ pub(super) async fn begin(
         .await
         .map_err(|it| Problem::new(Code::Storage, it.to_string(), ""))??;
     let (status, id) = match noted {
-        Noted::Before(id) => (StatusCode::OK, id),
-        Noted::New(id) => {
+        (_, Noted::Before(id)) => (StatusCode::OK, id),
+        (id, Noted::New) => {
             let order = Order::Move {
                 id: id.clone(),
                 request,
             };
-            let answered = obey(&state.desk, &caller, order).await.map(|_| ());
+            let answered = obey_since(arrival, &state.desk, &caller, order).await;
+            let answered = answered.map(|_| ());
             (StatusCode::CREATED, state.desk.settle_motion(id, answered)?)
         }
     };
@@ -78,7 +81,7 @@ pub(super) async fn motion(
     Named(id): Named,
     wait: MaybeQuery<Wait>,
 ) -> Result<Json<MotionView>, Problem> {
-    let asked = query(wait)?.until(|| state.desk.motion(&id), |it| it.state.is_end());
+    let asked = query(wait)?.until(|| state.desk.motion(&id));
     Ok(Json(asked.await?))
 }
 
@@ -95,6 +98,7 @@ pub(super) async fn motion(
 pub(super) async fn jog(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     headers: HeaderMap,
     Body(request): Body<JogRequest>,
 ) -> Result<Json<MotionView>, Problem> {
@@ -103,7 +107,7 @@ pub(super) async fn jog(
         return Err(Problem::new(Code::BadRequest, what, "leave it out"));
     }
     let order = state.desk.jog_order(&request);
-    let id = named(obey(&state.desk, &caller, order).await?)?;
+    let id = named(obey_since(arrival, &state.desk, &caller, order).await?)?;
     Ok(Json(state.desk.motion(&id)?))
 }
 

@@ -7,11 +7,11 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::super::guard::{Asks, Body, By, Named, key_of};
+use super::super::guard::{Arrived, Asks, Body, By, Named, key_of};
 use super::super::identity::Admitted;
 use super::super::needs::{enough, of_run};
 use super::super::state::State;
-use super::{MaybeQuery, Wait, obey, query};
+use super::{MaybeQuery, Wait, obey, obey_since, query};
 use crate::desk::Prepared;
 use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
@@ -42,6 +42,7 @@ pub(super) async fn runs(Of(state): Of<State>) -> Json<Vec<RunView>> {
 pub(super) async fn plan(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     admitted: Admitted,
     headers: HeaderMap,
     Body(request): Body<RunRequest>,
@@ -58,7 +59,8 @@ pub(super) async fn plan(
     let (status, id) = match prepared {
         Prepared::Before(id) => (StatusCode::OK, id),
         Prepared::New(id, order) => {
-            let planned = obey(&state.desk, &caller, *order).await.map(|_| ());
+            let planned = obey_since(arrival, &state.desk, &caller, *order).await;
+            let planned = planned.map(|_| ());
             let id = state.desk.settle_run(id, key.as_deref(), planned)?;
             (StatusCode::CREATED, id)
         }
@@ -111,7 +113,7 @@ pub(super) async fn run(
 ) -> Result<Json<RunView>, Problem> {
     let looked = query(looked)?;
     let (left_out, wait_s) = (looked.left_out()?, looked.wait_s);
-    let asked = Wait { wait_s }.until(|| state.desk.run(&id), |it| it.state.is_end());
+    let asked = Wait { wait_s }.until(|| state.desk.run(&id));
     let mut run = asked.await?;
     run.reached.drain(..left_out.min(run.reached.len()));
     Ok(Json(run))
@@ -129,11 +131,14 @@ pub(super) async fn run(
 pub(super) async fn start(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     admitted: Admitted,
     Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
     enough(admitted.role, of_run(state.desk.run(&id)?.kind))?;
-    obey(&state.desk, &caller, Order::Start { run: id.clone() }).await?;
+    state.desk.require_storage()?;
+    let order = Order::Start { run: id.clone() };
+    obey_since(arrival, &state.desk, &caller, order).await?;
     Ok(Json(state.desk.run(&id)?))
 }
 
@@ -186,11 +191,14 @@ pub(super) async fn pause(
 pub(super) async fn resume(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     admitted: Admitted,
     Named(id): Named,
 ) -> Result<Json<RunView>, Problem> {
     enough(admitted.role, of_run(state.desk.run(&id)?.kind))?;
-    obey(&state.desk, &caller, Order::Resume { run: id.clone() }).await?;
+    state.desk.require_storage()?;
+    let order = Order::Resume { run: id.clone() };
+    obey_since(arrival, &state.desk, &caller, order).await?;
     Ok(Json(state.desk.run(&id)?))
 }
 
@@ -206,6 +214,7 @@ pub(super) async fn resume(
 pub(super) async fn answer(
     Of(state): Of<State>,
     By(caller): By,
+    Arrived(arrival): Arrived,
     admitted: Admitted,
     Named(id): Named,
     Body(answer): Body<AnswerRequest>,
@@ -217,6 +226,6 @@ pub(super) async fn answer(
         answer,
         text,
     };
-    obey(&state.desk, &caller, order).await?;
+    obey_since(arrival, &state.desk, &caller, order).await?;
     Ok(Json(state.desk.run(&id)?))
 }

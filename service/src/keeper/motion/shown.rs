@@ -45,6 +45,7 @@ pub(super) fn view(motion: &Motion, seats: &[Seat]) -> MotionView {
         cause: None,
         axes,
         told: None,
+        kept: None,
     }
 }
 
