@@ -25,7 +25,7 @@ use crate::ledger::{Asked, Ledger, LedgerError};
 use crate::order::{Answer, Answered, Letter, Order, Reply, Unanswered};
 use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
-use crate::snapshot::{Board, Fixed, Snapshot};
+use crate::snapshot::{Beat, Board, Fixed, Snapshot};
 use crate::view::{AxisView, Cause, Event, Leased, MachineView, MotionState, MotionView};
 pub(crate) use along::Judges;
 pub(crate) use runs::Prepared;
@@ -436,9 +436,13 @@ impl Desk {
         }
     }
 
-    /// The time by its clock when it said last how it is, in seconds.
-    pub(crate) fn clock_s(&self) -> f64 {
-        self.snapshot().now.seconds()
+    /// The newest sign of life of the machine's thread.
+    pub(crate) fn beat(&self) -> Beat {
+        let snapshot = self.snapshot();
+        Beat {
+            ticks: snapshot.ticks,
+            clock_s: snapshot.now.seconds(),
+        }
     }
 
     /// Its axes.

@@ -60,6 +60,8 @@ pub(crate) enum Order {
     Calibration(Choice),
     /// The lease goes back.
     Release,
+    /// The holder of the lease still waits for something.
+    KeepLease,
     /// Something that a person should look after is said among the events.
     Warn { text: String },
     /// The service ends.
@@ -73,6 +75,7 @@ impl Order {
             Self::Stop { .. }
             | Self::Lease { .. }
             | Self::Release
+            | Self::KeepLease
             | Self::Warn { .. }
             | Self::End => false,
             Self::Move { .. }

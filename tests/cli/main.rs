@@ -11,6 +11,7 @@ mod examples;
 mod full;
 mod gantry;
 mod held;
+mod hung;
 mod intended;
 mod interrupted;
 mod job;

@@ -93,9 +93,11 @@ class Person:
         self.pace = pace
 
     def take_control(self):
-        if self.browser.value("document.getElementById('take').hidden"):
-            return
         take = "document.getElementById('take')"
+        if self.browser.value(f"{take}.hidden"):
+            # While time passed freely the lease may have lapsed, of which the page hears with its next order.
+            self.browser.value("document.getElementById('give').click()")
+            self.browser.wait_for("no control", f"!{take}.hidden")
         self.browser.value(f"{take}.click()")
         self.browser.wait_for("control, or a question", f"{take}.hidden || {take}.dataset.sure === 'yes'")
         if not self.browser.value(f"{take}.hidden"):
@@ -144,14 +146,15 @@ class Person:
         self.take_control()
         self._press("Start")
         self.pace.slow = False
-        self.browser.wait_for("its question", f"{NEWEST}.querySelector('.question') !== null")
+        asked = self.browser.wait_for("its question", f"{NEWEST}.querySelector('.question')?.innerText")
         self.pace.slow = True
         self.take_control()
         self._press("done")
         self.pace.slow = False
         self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('points before')")
         self.pace.slow = True
-        return read_only and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
+        warned = "the axis holds its place under power and moves as soon as this is answered: be out of its way first"
+        return read_only and warned in asked and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
 
     def path(self):
         """Reads a path from a file, with a slip first, plans it and follows it; what the page says of it."""

@@ -34,6 +34,8 @@ use crate::request::Caller;
 const WAIT_MAX: Duration = Duration::from_secs(300);
 /// How often an answer that is held back looks.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
+/// How often whoever waits with the token of the lease keeps it.
+const KEEP_EVERY: Duration = Duration::from_secs(5);
 
 #[derive(utoipa::OpenApi)]
 #[openapi(
@@ -182,9 +184,10 @@ pub(super) struct Wait {
 }
 
 impl Wait {
-    /// Asks until it has ended or the time is over.
+    /// Asks until it has ended or the time is over, and does `keep` now and then.
     pub(super) async fn until<T>(
         self,
+        keep: impl Fn(),
         ask: impl Fn() -> Result<T, Problem>,
         has_ended: impl Fn(&T) -> bool,
     ) -> Result<T, Problem> {
@@ -195,14 +198,29 @@ impl Wait {
             let help = "give seconds from 0 to 300";
             return Err(Problem::new(Code::BadRequest, what, help));
         }
-        let limit = tokio::time::Instant::now() + Duration::from_secs_f64(wait_s);
+        let begun = tokio::time::Instant::now();
+        let limit = begun + Duration::from_secs_f64(wait_s);
+        let mut keep_at = begun;
         loop {
             let asked = ask()?;
-            if has_ended(&asked) || tokio::time::Instant::now() >= limit {
+            let now = tokio::time::Instant::now();
+            if has_ended(&asked) || now >= limit {
                 return Ok(asked);
+            }
+            if now >= keep_at {
+                keep_at = now + KEEP_EVERY;
+                keep();
             }
             tokio::time::sleep(LOOK_EVERY).await;
         }
+    }
+}
+
+/// Whoever waits with the token of the lease keeps it as long as his connection lives.
+pub(super) fn keep_lease(desk: &Desk, caller: &Caller) {
+    if caller.lease.is_some() {
+        // Where too many orders wait, the next time is soon enough.
+        let _ = desk.give(caller, Order::KeepLease);
     }
 }
 
@@ -237,4 +255,24 @@ pub(super) async fn obey_at_last(
 /// Gives an order and waits for its answer, without keeping anybody else waiting.
 pub(super) async fn obey(desk: &Desk, caller: &Caller, order: Order) -> Result<Answer, Problem> {
     desk.give(caller, order)?.answer().await
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn a_wait_keeps_the_lease_at_once_and_each_five_seconds() {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_time()
+            .start_paused(true)
+            .build();
+        let kept = Cell::new(0);
+        let wait = Wait { wait_s: Some(12.0) };
+        let waiting = wait.until(|| kept.set(kept.get() + 1), || Ok(()), |()| false);
+        runtime.unwrap().block_on(waiting).unwrap();
+        assert_eq!(kept.get(), 3, "at 0, 5 and 10 s");
+    }
 }

@@ -19,6 +19,7 @@ impl Keeper {
             caller,
             reply,
         } = letter;
+        self.keep_lease(machine.now(), &caller);
         let allowed = match order.needs_lease() {
             true => self.check_lease(machine.now(), &caller),
             false => Ok(()),
@@ -40,6 +41,7 @@ impl Keeper {
                 self.warn(&text);
                 Ok(Answer::Done)
             }
+            Order::KeepLease => Ok(Answer::Done),
             Order::Release => self.release(machine.now(), &caller).map(|()| Answer::Done),
             Order::Move { id, request } => self
                 .accept_motion(machine, &id, by, &request)
