@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from browser import Browser
-from kept_machine import KeptMachine
+from kept_machine import KeptMachine, Pace
 
 STATE = "document.getElementById('state').textContent"
 ANSWER = "document.getElementById('stop-answer').textContent"
@@ -35,10 +35,10 @@ def shot(page, name):
         (Path(SHOTS) / f"{name}.png").write_bytes(base64.b64decode(taken["data"]))
 
 
-def look_at(page, url):
-    """Opens the service's page, and waits until it shows the machine."""
-    page.open(url + "/")
-    page.wait_for("the machine", f"{STATE} === 'running' && document.querySelector('#axes .place')")
+def look_at(page):
+    """Waits until the page, in front of all others of its window, shows the machine."""
+    page.command("Page.bringToFront")
+    page.wait_for("the machine", f"{STATE} === 'running' && document.querySelector('#axes .place') !== null")
 
 
 def stopped(page):
@@ -77,21 +77,28 @@ def many(kept, browser):
     pages = [browser.tab(in_window=True) for _ in range(WINDOWS - 1)]
     pages += [browser.tab() for _ in range(TABS - WINDOWS)]
     for page in pages:
-        look_at(page, kept.url)
+        page.open(kept.url + "/")
+        page.wait_for("the page", "document.readyState === 'complete'")
     pages.insert(0, browser)
     hidden = [page.value("document.hidden") for page in pages]
-    stops = [stopped(page) for page in pages]
+    stops = []
+    for page in pages:
+        look_at(page)
+        stops.append(stopped(page))
     errors = [error for page in pages for error in page.errors]
     return {"hidden": sum(hidden), "pages": len(pages), "stops": stops, "errors": errors}
 
 
 def main():
     programs, chromium = sys.argv[1:]
-    with Browser(chromium) as browser, KeptMachine(programs, is_real_time=True) as kept:
-        look_at(browser, kept.url)
+    with Browser(chromium) as browser, KeptMachine(programs) as kept:
+        pace = Pace(kept.clock)
+        browser.open(kept.url + "/")
+        look_at(browser)
         report = hangs(kept, browser)
         report["many"] = many(kept, browser)
         browser.open("about:blank")
+        pace.end()
     print(json.dumps(report))
 
 
