@@ -8,6 +8,7 @@ mod controls;
 mod demo;
 mod example;
 mod examples;
+mod foreign_files;
 mod full;
 mod gantry;
 mod held;
