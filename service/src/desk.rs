@@ -25,7 +25,7 @@ use crate::ledger::{Asked, AskedMotion, End, Ledger, Noted, WRITE_LIMIT};
 use crate::order::{Answer, Answered, Letter, Order, Reply, Unanswered};
 use crate::problem::{Code, Problem};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
-use crate::snapshot::{Board, Fixed, Snapshot};
+use crate::snapshot::{Beat, Board, Fixed, Snapshot};
 use crate::stops::{Arrival, Stops};
 use crate::view::{AxisView, Ending, Event, Leased, MachineView, MotionView, StorageView};
 pub(crate) use along::Judges;
@@ -434,9 +434,13 @@ impl Desk {
         }
     }
 
-    /// The time by its clock when it said last how it is, in seconds.
-    pub(crate) fn clock_s(&self) -> f64 {
-        self.snapshot().now.seconds()
+    /// The newest sign of life of the machine's thread.
+    pub(crate) fn beat(&self) -> Beat {
+        let snapshot = self.snapshot();
+        Beat {
+            ticks: snapshot.ticks,
+            clock_s: snapshot.now.seconds(),
+        }
     }
 
     /// Its axes.

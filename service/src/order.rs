@@ -61,6 +61,8 @@ pub(crate) enum Order {
     Calibration(Choice),
     /// The lease goes back.
     Release,
+    /// The holder of the lease still waits for something.
+    KeepLease,
     /// Something that a person should look after is said among the events.
     Warn { text: String },
     /// The service ends.
@@ -86,6 +88,7 @@ impl Order {
             | Self::Lease { .. }
             | Self::Calibration(_)
             | Self::Release
+            | Self::KeepLease
             | Self::Warn { .. }
             | Self::End => false,
         }
@@ -97,6 +100,7 @@ impl Order {
             Self::Stop { .. }
             | Self::Lease { .. }
             | Self::Release
+            | Self::KeepLease
             | Self::Warn { .. }
             | Self::End => false,
             Self::Move { .. }

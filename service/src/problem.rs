@@ -41,6 +41,8 @@ pub enum Code {
     ErrorStop,
     /// Somebody else has the lease.
     Leased,
+    /// The token of a lease that has lapsed, was given back or taken, or is of an earlier service.
+    LeaseLapsed,
     /// The same Idempotency-Key with another request.
     KeyReused,
     /// This service does not offer that for this axis.
@@ -113,7 +115,7 @@ impl Code {
             | Self::NotOffered
             | Self::Configuration
             | Self::OutOfTolerance => 422,
-            Self::Leased => 423,
+            Self::Leased | Self::LeaseLapsed => 423,
             Self::AxisBusy
             | Self::AxisDisabled
             | Self::NotZeroed
@@ -147,6 +149,7 @@ impl Code {
             | Self::Refused
             | Self::ErrorStop
             | Self::Leased
+            | Self::LeaseLapsed
             | Self::Unauthorized
             | Self::Forbidden
             | Self::NotAsked

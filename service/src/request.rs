@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 
 mod given;
 mod rows;
+mod targets;
 mod whole;
 
 pub use given::GivenFile;
@@ -48,6 +49,7 @@ pub type Target = BTreeMap<String, Coordinate>;
 pub struct MoveRequest {
     /// Where each axis goes, in machine coordinates. The axes begin in one tick and end each in its own time; those
     /// of a platform (x, y, theta) and of three axes that are corrected together move as one.
+    #[serde(deserialize_with = "targets::read")]
     #[schema(schema_with = crate::quantity::targets)]
     pub targets: Target,
     /// How fast each may be at most; no faster than its configuration says, which holds when left out. An angular speed
@@ -393,9 +395,10 @@ pub struct LeaseRequest {
     /// Who: a name for people. What a terminal or a page might obey is left out of it.
     #[schema(min_length = 1, max_length = 64)]
     pub name: String,
-    /// For how long, in seconds, unless it is renewed.
+    /// For how long, in seconds, 30 when left out. Each order with its token begins them anew, and so does each 5 s of
+    /// a wait with it (`wait_s`).
     #[serde(default = "lease_seconds", deserialize_with = "whole::read")]
-    #[schema(minimum = 1, maximum = 3600)]
+    #[schema(minimum = 1, maximum = 3600, default = 30)]
     pub seconds: u32,
     /// Takes it from whoever has it, who is told.
     #[serde(default)]

@@ -74,6 +74,15 @@ pub(crate) struct Snapshot {
     pub(crate) ticks: u64,
 }
 
+/// A sign of life of the machine's thread.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Beat {
+    /// How often it has ticked.
+    pub(crate) ticks: u64,
+    /// The machine's clock, in seconds.
+    pub(crate) clock_s: f64,
+}
+
 impl Snapshot {
     /// Of a machine that is not there yet.
     pub(crate) fn before() -> Self {

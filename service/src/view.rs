@@ -432,6 +432,10 @@ pub struct QuestionView {
     /// Whether hands are in the machine until it is answered: no axis is moved or enabled meanwhile.
     #[serde(default)]
     pub by_hand: bool,
+    /// What the person must know of the drives first: they may be switched on, or an axis moves, as soon as it is
+    /// answered. Empty where nothing is driven.
+    #[serde(default)]
+    pub safety: String,
     /// What is to be done, for programs.
     #[schema(value_type = Object)]
     pub task: serde_json::Value,

@@ -9,6 +9,7 @@ import re
 import socket
 import subprocess
 import tempfile
+import threading
 import time
 import tomllib
 import urllib.error
@@ -28,6 +29,11 @@ NEW_SET_POINT = 1 << 4
 # A zero that is found is this far from the drive's own at most.
 ORIGIN_MM = 0.2
 PIECE = 1 << 24
+# While a person acts, the machine's time passes at a fifth of the wall's, so that a lease of ten seconds outlives a click
+# on however busy a computer; while a run is under way, as fast as the computer can.
+STEP_NS = 2_000_000
+PAUSE_S = 0.01
+STRIDE_NS = 1_000_000_000
 # Fewer measurements than the shipped ones: they are not what is judged.
 SHORTER = (("runs = 3", "runs = 2"), ("targets = 8\nruns = 5", "targets = 4\nruns = 2"))
 # By the computer's clock a request is late that is not by the machine's, whose clock runs ahead.
@@ -191,6 +197,39 @@ class KeptMachine:
             for name in group["targets"]:
                 named.setdefault(name, ("arcsec", -600.0, 600.0) if name == "theta" else ("mm", -4.0, 4.0))
         return named
+
+
+class Pace:
+    """Somebody at the machine's clock who lets time pass slowly, or does not hold it back."""
+
+    def __init__(self, clock):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(PATIENCE_S)
+        self.socket.connect(str(clock))
+        self.lines = self.socket.makefile()
+        self.now = int(self._asked("hello 1 0 a pace").split()[1])
+        self.slow = True
+        self.over = False
+        self.thread = threading.Thread(target=self._hold, daemon=True)
+        self.thread.start()
+
+    def _asked(self, line):
+        self.socket.sendall(f"{line}\n".encode())
+        return self.lines.readline()
+
+    def _hold(self):
+        while not self.over:
+            step = STEP_NS if self.slow else STRIDE_NS
+            self.now = int(self._asked(f"idle {self.now + step}").split()[1])
+            if self.slow:
+                time.sleep(PAUSE_S)
+
+    def end(self):
+        """Takes leave."""
+        self.over = True
+        self.thread.join(PATIENCE_S)
+        self.socket.sendall(b"bye\n")
+        self.socket.close()
 
 
 class Truth:

@@ -72,3 +72,42 @@ fn a_person_at_the_page_takes_a_machine_through_its_cycle_and_through_a_lost_con
         "{report}"
     );
 }
+
+/// A person at a service that hangs, and at one of more pages than a browser has connections.
+#[test]
+fn a_page_shows_silence_and_whether_a_stop_was_taken() {
+    if !rigs().contains(&Rig::Pty) {
+        return;
+    }
+    if !has_browser() || !can_import("websocket") {
+        let why = "Chromium or Python's websocket-client is not installed: run tests/run";
+        return tests::not_run("a person at the page of a service that hangs", why);
+    }
+    let programs = programs();
+    let words = [&*programs.to_string_lossy(), BROWSER];
+    let report = Peer::start("silence_judge.py", &words).finish();
+    for (name, expected) in [
+        ("grey_before", false),
+        ("grey", true),
+        ("grey_after", false),
+    ] {
+        assert_eq!(report[name], expected, "{name}: {report}");
+    }
+    let within = |stop: &Value, word: &str, most_s: f64| {
+        let said = stop[0].as_str().expect("what the page says");
+        let after_s = stop[1].as_f64().expect("seconds");
+        assert!(said.starts_with(word), "{stop}: {report}");
+        assert!(after_s <= most_s, "{stop}: {report}");
+    };
+    // What the page draws and this program asks again for comes on top of the two seconds.
+    let silent_s = report["silent_s"].as_f64().expect("seconds");
+    assert!((1.0..=3.0).contains(&silent_s), "{report}");
+    let unanswered = &report["unanswered"];
+    within(unanswered, "NO ANSWER: use the emergency stop", 3.0);
+    within(&report["taken"], "taken at ", 2.0);
+    let stops = report["many"]["stops"].as_array().expect("of each page");
+    assert_eq!(stops.len(), 10, "{report}");
+    for stop in stops {
+        within(stop, "taken at ", 2.0);
+    }
+}

@@ -10,20 +10,13 @@ PROGRAMS is the folder with `truestage` and `mock-bus`. The last line is a repor
 import base64
 import json
 import os
-import socket
 import sys
-import threading
 import time
 from pathlib import Path
 
 from browser import Browser
-from kept_machine import PATIENCE_S, KeptMachine, Truth, wait_for
+from kept_machine import PATIENCE_S, KeptMachine, Pace, Truth, wait_for
 
-# While a person acts, the machine's time passes at a fifth of the wall's, so that a lease of ten seconds outlives a click
-# on however busy a computer; while a run is under way, as fast as the computer can.
-STEP_NS = 2_000_000
-PAUSE_S = 0.01
-STRIDE_NS = 1_000_000_000
 NEWEST = "document.querySelector('#runs article')"
 LIVE = "#axes canvas.live-position"
 JOB = """schema_version = 1
@@ -52,39 +45,6 @@ RARE_SYNCS = (
 SHOTS = os.environ.get("TRUESTAGE_SHOTS")
 
 
-class Pace:
-    """Somebody at the machine's clock who lets time pass slowly, or does not hold it back."""
-
-    def __init__(self, clock):
-        self.socket = socket.socket(socket.AF_UNIX)
-        self.socket.settimeout(PATIENCE_S)
-        self.socket.connect(str(clock))
-        self.lines = self.socket.makefile()
-        self.now = int(self._asked("hello 1 0 a pace").split()[1])
-        self.slow = True
-        self.over = False
-        self.thread = threading.Thread(target=self._hold, daemon=True)
-        self.thread.start()
-
-    def _asked(self, line):
-        self.socket.sendall(f"{line}\n".encode())
-        return self.lines.readline()
-
-    def _hold(self):
-        while not self.over:
-            step = STEP_NS if self.slow else STRIDE_NS
-            self.now = int(self._asked(f"idle {self.now + step}").split()[1])
-            if self.slow:
-                time.sleep(PAUSE_S)
-
-    def end(self):
-        """Takes leave."""
-        self.over = True
-        self.thread.join(PATIENCE_S)
-        self.socket.sendall(b"bye\n")
-        self.socket.close()
-
-
 class Person:
     """Who looks at the page and presses its buttons."""
 
@@ -93,9 +53,11 @@ class Person:
         self.pace = pace
 
     def take_control(self):
-        if self.browser.value("document.getElementById('take').hidden"):
-            return
         take = "document.getElementById('take')"
+        if self.browser.value(f"{take}.hidden"):
+            # While time passed freely the lease may have lapsed, of which the page hears with its next order.
+            self.browser.value("document.getElementById('give').click()")
+            self.browser.wait_for("no control", f"!{take}.hidden")
         self.browser.value(f"{take}.click()")
         self.browser.wait_for("control, or a question", f"{take}.hidden || {take}.dataset.sure === 'yes'")
         if not self.browser.value(f"{take}.hidden"):
@@ -144,14 +106,15 @@ class Person:
         self.take_control()
         self._press("Start")
         self.pace.slow = False
-        self.browser.wait_for("its question", f"{NEWEST}.querySelector('.question') !== null")
+        asked = self.browser.wait_for("its question", f"{NEWEST}.querySelector('.question')?.innerText")
         self.pace.slow = True
         self.take_control()
         self._press("done")
         self.pace.slow = False
         self.browser.wait_for("its end", f"{NEWEST}.innerText.includes('points before')")
         self.pace.slow = True
-        return read_only and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
+        warned = "the axis holds its place under power and moves as soon as this is answered: be out of its way first"
+        return read_only and warned in asked and "lay a part on the stage" in planned and "\ndone\n" in self.browser.value(f"{NEWEST}.innerText")
 
     def path(self):
         """Reads a path from a file, with a slip first, plans it and follows it; what the page says of it."""

@@ -52,8 +52,9 @@ impl Disk {
             .0
             .changed
             .wait_timeout_while(self.state(), PATIENCE, |state| state.hanging == 0);
-        let (_, waited) = waited.unwrap_or_else(PoisonError::into_inner);
-        assert!(!waited.timed_out(), "nobody writes");
+        let (state, waited) = waited.unwrap_or_else(PoisonError::into_inner);
+        drop(state);
+        assert!(!waited.timed_out(), "nothing writes");
     }
 
     /// No byte more has room.

@@ -328,11 +328,10 @@ fn a_stream_in_which_nothing_happens_says_that_it_is_alive() {
             .write_all(b"GET /v1/events HTTP/1.0\r\nhost: x\r\n\r\n")
             .unwrap();
         let begun = Instant::now();
-        let lines = BufReader::new(stream)
+        let mut lines = BufReader::new(stream)
             .lines()
-            .map(|it| it.expect("it is not silent"));
-        let said: Vec<String> = lines.skip_while(|it| !it.is_empty()).take(2).collect();
-        assert_eq!(said[1], ":", "no event, a comment");
+            .map(|line| line.expect("it is not silent"));
+        assert!(lines.any(|line| line == ":"), "a comment");
         assert!(begun.elapsed() < Duration::from_secs(10));
     });
 }
@@ -344,6 +343,10 @@ fn the_page_comes_with_a_policy_that_lets_nothing_in_from_elsewhere() {
             ("/", "text/html"),
             ("/page.css", "text/css"),
             ("/page.js", "text/javascript"),
+            ("/feed.js", "text/javascript"),
+            ("/link.js", "text/javascript"),
+            ("/stop.js", "text/javascript"),
+            ("/stream.js", "text/javascript"),
         ] {
             let answer = http.ask(&format!("GET {path} HTTP/1.1"), b"");
             assert_eq!(answer.status, 200, "{path}");

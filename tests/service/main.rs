@@ -1,5 +1,6 @@
 //! The resident service: its contract, each line a test, written once for every interface.
 
+mod alive;
 mod client;
 mod contract;
 mod disk;

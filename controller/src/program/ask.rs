@@ -6,15 +6,16 @@ use machine::records::short;
 use serde_json::{Value, json};
 
 use crate::Failure;
-use crate::program::exchange::{ask, plain};
+use crate::program::exchange::{ask, plain, urgently};
 use crate::program::output::{Ended, Output};
 use crate::program::{PowerArgs, ServiceArgs};
 
 /// What the machine and its axes are.
 pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
-    let at = args.place()?;
-    let machine = ask(&at, "GET", "/v1/machine", "")?;
-    let axes = ask(&at, "GET", "/v1/axes", "")?;
+    let (machine, axes) = urgently(&args.place()?, |at| {
+        let machine = ask(at, "GET", "/v1/machine", "")?;
+        Ok((machine, ask(at, "GET", "/v1/axes", "")?))
+    })?;
     let text = text_of(&machine, &axes);
     output.result(&text, &json!({"machine": machine, "axes": axes}))
 }
@@ -23,7 +24,7 @@ pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
 pub(crate) fn stop(args: &ServiceArgs, quick: bool, output: Output) -> Ended {
     let mode = if quick { "quick" } else { "controlled" };
     let body = json!({"mode": mode}).to_string();
-    let answer = ask(&args.place()?, "POST", "/v1/stop", &body)?;
+    let answer = urgently(&args.place()?, move |at| ask(at, "POST", "/v1/stop", &body))?;
     output.result(&format!("a {mode} stop is under way"), &answer)
 }
 

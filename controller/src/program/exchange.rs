@@ -4,6 +4,8 @@ use std::env;
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
+use std::sync::mpsc::sync_channel;
+use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -14,6 +16,8 @@ use crate::program::secure;
 
 /// The longest that an answer may take: a service answers within a tick.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// The longest that a person waits who wants to know whether the machine stops, or what it does.
+const URGENT: Duration = Duration::from_secs(2);
 /// More than any answer has, in bytes.
 const ANSWER_MAX: u64 = 16 << 20;
 /// The token of a lease, as `POST /v1/lease` gave it.
@@ -58,6 +62,33 @@ pub(crate) fn ask(at: &str, method: &str, path: &str, body: &str) -> Result<Valu
         help: "start one with `truestage serve`, or say where it is with --at".into(),
     })?;
     exchange(stream, at, (method, path), body)
+}
+
+/// What `asked` comes to, in two seconds at most: also where the service takes a connection and says nothing, or too slowly.
+/// What has been sent is not taken back.
+pub(crate) fn urgently<T: Send + 'static>(
+    at: &str,
+    asked: impl FnOnce(&str) -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    let (answer, answered) = sync_channel(1);
+    let service = at.to_owned();
+    // It is left behind where it hangs: the program ends.
+    thread::spawn(move || answer.send(asked(&service)));
+    answered
+        .recv_timeout(URGENT)
+        .unwrap_or_else(|_| Err(silent(at, URGENT)))
+}
+
+/// Nothing is known of the drives of a service that does not answer.
+fn silent(at: &str, limit: Duration) -> Failure {
+    Failure::Kept {
+        said: format!(
+            "the service at {at} does not answer: use the emergency stop; nothing was heard for {} s, and nothing is \
+             known of the drives. What was asked for may still be done when it goes on",
+            limit.as_secs()
+        ),
+        exit_code: LOST,
+    }
 }
 
 /// An answer without an end, from its first line on. A service that lives says so every three seconds; one that says
@@ -123,6 +154,9 @@ pub(crate) fn ask_on(at: &str, method: &str, path: &str, body: &str) -> Result<V
 }
 
 fn gone(at: &str, path: &str, error: &io::Error) -> Failure {
+    if let io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut = error.kind() {
+        return silent(at, PATIENCE);
+    }
     Failure::Kept {
         said: format!(
             "the service at {at} has ended before {path} was answered ({error}); without it the drives stop and are \

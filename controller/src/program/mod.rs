@@ -113,7 +113,7 @@ enum Command {
     Doctor(MachineArgs),
     /// List the devices on the buses and what does not match the configuration; nothing changes.
     Scan(MachineArgs),
-    /// Acknowledge the fault of a drive, once; nothing moves.
+    /// Acknowledge the fault of the axis that is named, or of each that has one, once; nothing moves.
     Reset(AxisArgs),
     /// Find the origin: with Hall sensors, on index pulses, or on an index mark.
     Zero(ZeroArgs),

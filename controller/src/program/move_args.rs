@@ -97,6 +97,19 @@ impl MoveArgs {
     }
 
     /// # Errors
+    /// When it names an axis twice: nobody knows which place is meant.
+    pub(crate) fn each_once(&self) -> Result<(), Failure> {
+        let names: Vec<&str> = self.named().collect();
+        let twice = (1..names.len()).find(|at| names[..*at].contains(&names[*at]));
+        twice.map_or(Ok(()), |at| {
+            Err(Failure::Usage {
+                what: format!("`{}` is named twice", names[at]),
+                help: "name each axis once".into(),
+            })
+        })
+    }
+
+    /// # Errors
     /// When it agrees to go beyond a calibration that has no end, or cannot be left.
     pub(crate) fn without_beyond(&self) -> Result<(), Failure> {
         only_for("--beyond", "linear axes", self.agreed.beyond)

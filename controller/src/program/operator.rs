@@ -19,7 +19,11 @@ use crate::Failure;
 use crate::program::output::Output;
 use crate::rotary::sighted::{Asked, Person, Question};
 use crate::rotary::{Operator, PlateMove, PlateTask};
+use crate::runs::DriveState;
 use crate::volumetric::{LineOperator, LineOptics, LineTask};
+
+/// How a question is answered here.
+const ENTER: &str = "you press Enter";
 
 /// Asks on stderr and waits for Enter on stdin; the machine lives on meanwhile.
 #[derive(Debug)]
@@ -112,12 +116,14 @@ impl Terminal {
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
         let drives = match self.is_driven {
-            true => "the drives of this run are switched off",
-            false => "this run has no drives",
+            true => DriveState::Off.warning(ENTER),
+            false => {
+                "this run has no drives, which is not a safe stop: make the machine safe first"
+                    .to_owned()
+            }
         };
         self.output.must_say(&format!(
-            "  {drives}, which is not a safe stop: make the machine safe first; press Enter when it is \
-             done, Ctrl-C to stop (what was read is kept)"
+            "  {drives}; press Enter when it is done, Ctrl-C to stop (what was read is kept)"
         ));
         Ok(())
     }
@@ -137,10 +143,10 @@ impl Terminal {
         };
         // What was typed before is no answer to this: a hand may be in the machine.
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
-        self.output.must_say(
-            "  the axis holds its place under power and moves as soon as you press Enter: be out of its way \
-             first; Ctrl-C stops it (what was reached is kept)",
-        );
+        let drives = DriveState::Holding.warning(ENTER);
+        self.output.must_say(&format!(
+            "  {drives}; Ctrl-C stops it (what was reached is kept)"
+        ));
         Ok(())
     }
 

@@ -15,6 +15,7 @@ pub(crate) fn axis_targets(args: &MoveArgs) -> Result<Vec<(String, Metres)>, Fai
             help: "write AXIS=LENGTH with a unit: x=12.5mm".into(),
         });
     }
+    args.each_once()?;
     args.targets.iter().map(|text| axis_target(text)).collect()
 }
 

@@ -8,14 +8,15 @@ use serde_json::json;
 use crate::failure::Failure;
 use crate::rotary::operator::{Operator, PlateTask};
 use crate::rotary::sighted::{self, Asked, CLOSE, CLOSE_PLACEMENT, READ_LINE};
-use crate::runs::{Person, Question};
+use crate::runs::{DriveState, Person, Question};
 
 /// Somebody who turns the plate, and reads its lines where no detector does.
 pub(crate) struct Asking<'p>(pub(crate) &'p mut dyn Person);
 
 impl Operator for Asking<'_> {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
-        let question = Question::of_work(PlateTask::WHAT, task.text(), json!(task));
+        let question =
+            Question::of_work(PlateTask::WHAT, task.text(), DriveState::Off, json!(task));
         self.0.ask(question)
     }
 
@@ -71,6 +72,7 @@ fn asked(question: &sighted::Question) -> Question {
         answers,
         takes_text: true,
         by_hand: question.by_hand,
+        drives: question.turns.then_some(DriveState::Holding),
         task,
     }
 }

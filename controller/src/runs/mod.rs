@@ -20,7 +20,7 @@ pub use data_file::DataFile;
 pub use group::{Group, Moved};
 pub use job::{AskedJob, JobJudge, JudgedJob};
 pub use path::{JudgedPath, PathJudge};
-pub use person::{Person, Question};
+pub use person::{DriveState, Person, Question};
 pub(crate) use planned::standing;
 pub use planned::{Planned, Travel};
 pub use task::{Found, Task};

@@ -5,6 +5,30 @@ use serde_json::Value;
 use super::teller::Told;
 use crate::failure::Failure;
 
+/// What the drives do while a person is asked, and as soon as the question is answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveState {
+    /// The run has switched its drives off.
+    Off,
+    /// The axis holds its place under power.
+    Holding,
+}
+
+impl DriveState {
+    /// What a person must know before he goes near; `answering` is how he answers, as in `you press Enter`.
+    pub fn warning(self, answering: &str) -> String {
+        match self {
+            Self::Off => format!(
+                "the drives of this run are switched off, which is not a safe stop: make the machine safe first; as \
+                 soon as {answering} they may be switched on"
+            ),
+            Self::Holding => format!(
+                "the axis holds its place under power and moves as soon as {answering}: be out of its way first"
+            ),
+        }
+    }
+}
+
 /// What a person is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
@@ -18,19 +42,27 @@ pub struct Question {
     pub takes_text: bool,
     /// Whether hands are in the machine until it is answered: nothing else moves then.
     pub by_hand: bool,
+    /// What the drives do meanwhile, where a person must know it.
+    pub drives: Option<DriveState>,
     /// What is to be done, for programs.
     pub task: Value,
 }
 
 impl Question {
-    /// What is done by hand: `done` when it is.
-    pub(crate) fn of_work(what: &'static str, text: String, task: Value) -> Self {
+    /// What is done by hand while the drives are as said: `done` when it is.
+    pub(crate) fn of_work(
+        what: &'static str,
+        text: String,
+        drives: DriveState,
+        task: Value,
+    ) -> Self {
         Self {
             what,
             text,
             answers: &["done"],
             takes_text: false,
             by_hand: true,
+            drives: Some(drives),
             task,
         }
     }

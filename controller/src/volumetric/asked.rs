@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::runs::{Person, Question};
+use crate::runs::{DriveState, Person, Question};
 use crate::volumetric::line::{LineOperator, LineOptics, LineTask};
 
 /// Somebody who sets lines up.
@@ -14,8 +14,8 @@ pub(crate) struct Asking<'p>(pub(crate) &'p mut dyn Person);
 impl LineOperator for Asking<'_> {
     fn ask_line(&mut self, task: &LineTask) -> Result<(), Failure> {
         let asked = json!(AskedLine::from(task));
-        self.0
-            .ask(Question::of_work(AskedLine::WHAT, task.text(), asked))
+        let question = Question::of_work(AskedLine::WHAT, task.text(), DriveState::Off, asked);
+        self.0.ask(question)
     }
 
     fn is_set_up(&mut self) -> Result<bool, Failure> {

@@ -7,7 +7,7 @@
 
 use core::marker::PhantomData;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{BufRead, BufReader, Read as _, Write};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -17,10 +17,16 @@ use super::difference::{Difference, first_difference};
 use super::hash::ConfigHash;
 use super::head::{IdentityRecord, InstrumentRecord};
 use super::line::{opened, sealed};
+use super::regular::open_regular;
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
 };
 use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
+
+/// So long a journal may be, in bytes: many times the longest that a run leaves.
+pub const JOURNAL_MAX: u64 = 256 << 20;
+/// So long a line of it.
+const LINE_MAX: u64 = 16 << 20;
 
 /// What a run is: written first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -357,8 +363,7 @@ pub fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
 /// When it cannot be read, has no header, a line before the last one is damaged, or one says what
 /// cannot be.
 pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
-    journal_of(path, &bytes)
+    journal_of(path, |_| {})
 }
 
 /// Reads a journal of whatever kind, and the entry of each whole line of it, marks included: JSON without its
@@ -367,29 +372,41 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
 /// # Errors
 /// Those of [`read_journal`].
 pub fn read_entries(path: &Path) -> Result<(ReadJournal<AnyLog>, Vec<String>), StoreError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
-    let read = journal_of(path, &bytes)?;
-    let whole = bytes.split_inclusive(|byte| *byte == b'\n');
-    let whole = whole.filter_map(|line| json_of(line).ok());
-    Ok((read, whole.collect()))
+    let mut whole = Vec::new();
+    let read = journal_of(path, |json| whole.push(json.to_owned()))?;
+    Ok((read, whole))
 }
 
-fn journal_of<L: Log>(path: &Path, bytes: &[u8]) -> Result<ReadJournal<L>, StoreError> {
+/// Reads the journal at `path` line by line, and tells `whole` the JSON of each whole line.
+fn journal_of<L: Log>(
+    path: &Path,
+    mut whole: impl FnMut(&str),
+) -> Result<ReadJournal<L>, StoreError> {
+    let file = open_regular(path, JOURNAL_MAX).map_err(io_error("read", path))?;
+    let mut file = BufReader::new(file);
     let mut read: Option<ReadJournal<L>> = None;
+    let mut hash = blake3::Hasher::new();
     let mut valid_bytes = 0;
     let mut torn = false;
-    let lines: Vec<&[u8]> = bytes.split_inclusive(|byte| *byte == b'\n').collect();
-    for (at, line) in lines.iter().enumerate() {
-        match parse_line::<L::Entry>(line) {
+    let mut line = Vec::new();
+    for number in 1.. {
+        let is_last = next_line(&mut file, &mut line).map_err(io_error("read", path))?;
+        if line.is_empty() {
+            break;
+        }
+        hash.update(&line);
+        let json = json_of(&line);
+        match json.as_deref().map_err(String::clone).and_then(parse_line) {
             Ok(parsed) => {
                 valid_bytes += line.len() as u64;
-                take(path, at + 1, parsed, &mut read)?;
+                take(path, number, parsed, &mut read)?;
+                whole(&json.unwrap_or_default());
             }
-            Err(_) if at + 1 == lines.len() => torn = true,
+            Err(_) if is_last => torn = true,
             Err(cause) => {
                 return Err(StoreError::Format {
                     path: path.to_owned(),
-                    line: at + 1,
+                    line: number,
                     cause,
                 });
             }
@@ -402,8 +419,15 @@ fn journal_of<L: Log>(path: &Path, bytes: &[u8]) -> Result<ReadJournal<L>, Store
     })?;
     read.valid_bytes = valid_bytes;
     read.torn = torn;
-    read.blake3 = blake3::hash(bytes).to_hex().to_string();
+    read.blake3 = hash.finalize().to_hex().to_string();
     Ok(read)
+}
+
+/// Reads one line with its end, nothing at the end of the file; whether nothing follows.
+fn next_line(file: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<bool> {
+    line.clear();
+    file.by_ref().take(LINE_MAX).read_until(b'\n', line)?;
+    Ok(file.fill_buf()?.is_empty())
 }
 
 /// The entry of a whole line.
@@ -412,16 +436,15 @@ fn json_of(line: &[u8]) -> Result<String, String> {
     opened(text.strip_suffix('\n').ok_or("the line has no end")?)
 }
 
-fn parse_line<E: DeserializeOwned>(line: &[u8]) -> Result<Line<E>, String> {
+fn parse_line<E: DeserializeOwned>(json: &str) -> Result<Line<E>, String> {
     #[derive(Deserialize)]
     struct Tag {
         entry: String,
     }
-    let json = json_of(line)?;
-    let tag: Tag = serde_json::from_str(&json).map_err(|error| error.to_string())?;
+    let tag: Tag = serde_json::from_str(json).map_err(|error| error.to_string())?;
     let parsed = match MARKS.contains(&tag.entry.as_str()) {
-        true => serde_json::from_str(&json).map(Line::Mark),
-        false => serde_json::from_str(&json).map(Line::Entry),
+        true => serde_json::from_str(json).map(Line::Mark),
+        false => serde_json::from_str(json).map(Line::Entry),
     };
     parsed.map_err(|error| error.to_string())
 }

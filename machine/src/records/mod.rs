@@ -38,6 +38,7 @@ mod journal;
 mod lease;
 mod line;
 mod name;
+mod regular;
 pub mod sound;
 mod store;
 mod thermometers;
@@ -52,12 +53,13 @@ pub use head::{
 };
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_entries,
-    read_journal,
+    AnyLog, ClosureEntry, JOURNAL_MAX, Journal, JournalHeader, Log, ReadJournal, not_resumable,
+    read_entries, read_journal,
 };
 pub use lease::Lease;
 pub use line::{opened, sealed};
 pub use name::short;
+pub use regular::open_regular;
 pub use store::{ActivePointer, Store};
 pub use thermometers::ThermometersEntry;
 

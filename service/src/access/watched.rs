@@ -3,6 +3,7 @@
 
 use core::time::Duration;
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
@@ -10,8 +11,16 @@ use std::time::{Instant, SystemTime};
 /// How often it is looked whether a file has changed.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// What a file looks like from outside: when it was changed, and how long it is.
-type Look = Vec<Option<(SystemTime, u64)>>;
+/// What a file looks like from outside: when it was changed, how long it is, and who may read it.
+type Look = Vec<Option<Seen>>;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Seen {
+    modified: SystemTime,
+    length: u64,
+    mode: u32,
+    owner: u32,
+}
 
 /// What some files say.
 pub(super) struct Watched<T, E> {
@@ -95,14 +104,40 @@ impl<T, E> Watched<T, E> {
 fn look_at(files: &[PathBuf]) -> Look {
     let looks = files.iter().map(|it| {
         let seen = fs::metadata(it).ok()?;
-        Some((seen.modified().ok()?, seen.len()))
+        Some(Seen {
+            modified: seen.modified().ok()?,
+            length: seen.len(),
+            mode: seen.mode(),
+            owner: seen.uid(),
+        })
     });
     looks.collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
     use super::*;
+    use crate::access::secret_file;
+
+    #[test]
+    fn a_file_whose_mode_alone_has_changed_is_judged_again() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let path = file.path().to_owned();
+        let mode = |mode| fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+        mode(0o640);
+        let secret = path.clone();
+        let read = move || secret_file::read(&secret);
+        let watched = Watched::open(vec![path.clone()], read).unwrap();
+        let begun = Instant::now();
+        let after = |seconds| watched.newest_at(begun + Duration::from_secs(seconds));
+        assert!(after(2).is_ok());
+        mode(0o644);
+        assert!(after(4).is_err(), "others can read it now");
+        mode(0o600);
+        assert!(after(6).is_ok());
+    }
 
     #[test]
     fn a_file_is_read_again_when_it_has_changed_and_not_otherwise() {

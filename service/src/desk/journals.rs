@@ -1,8 +1,10 @@
 //! Journals of runs, and the pages that are made of them.
 
+use std::fs::File;
+use std::io::{Read as _, Take};
 use std::path::{Path, PathBuf};
 
-use machine::records::{AnyLog, StoreError, read_journal};
+use machine::records::{AnyLog, JOURNAL_MAX, StoreError, open_regular, read_journal};
 use truestage::Failure;
 
 use super::Desk;
@@ -31,8 +33,18 @@ impl Desk {
     /// When there is none, or it cannot be read.
     pub fn journal(&self, name: &str) -> Result<String, Problem> {
         let path = self.journal_path(name)?;
-        let read = std::fs::read_to_string(&path);
-        read.map_err(|source| Problem::from(Failure::File { path, source }))
+        let mut text = String::new();
+        let read =
+            open_regular(&path, JOURNAL_MAX).and_then(|mut file| file.read_to_string(&mut text));
+        read.map_err(|source| Problem::from(Failure::File { path, source }))?;
+        Ok(text)
+    }
+
+    /// The same, to be read in pieces.
+    pub(crate) fn journal_file(&self, name: &str) -> Result<Take<File>, Problem> {
+        let path = self.journal_path(name)?;
+        let opened = open_regular(&path, JOURNAL_MAX);
+        opened.map_err(|source| Problem::from(Failure::File { path, source }))
     }
 
     /// The page of the journal `name`, or of that of the run with this name, in HTML.

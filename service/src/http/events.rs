@@ -25,8 +25,11 @@ use crate::view::Event;
 /// How often a stream looks, unless it samples more often.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
-/// A stream in which nothing happens says that it is alive so often: whoever hears nothing for longer has lost it.
-const ALIVE_EVERY: Duration = Duration::from_secs(3);
+/// A comment keeps a connection alive through what stands between, also while the machine's thread hangs.
+const COMMENT_EVERY: Duration = Duration::from_secs(3);
+
+/// How often a stream says that the machine's thread lives. Pages never hear of comments.
+const ALIVE_EVERY: Duration = Duration::from_millis(500);
 
 /// Between two samples of every axis.
 const SAMPLE_MS: core::ops::RangeInclusive<u64> = 1..=60_000;
@@ -55,6 +58,7 @@ struct Following {
     newest: u64,
     waiting: VecDeque<Sent>,
     sample: Option<Sampling>,
+    alive: Alive,
     closing: Closing,
     _stream: OwnedSemaphorePermit,
     /// Its connection keeps its place among the others.
@@ -66,6 +70,38 @@ struct Sampling {
     due: Instant,
     /// When the last one was by the machine's clock: the same again says nothing.
     last_s: f64,
+}
+
+/// The proof that the machine's thread lives: an event without an id, whatever kinds are asked for.
+struct Alive {
+    due: Instant,
+    /// The ticks of the machine's thread when it was sent last.
+    ticks: u64,
+}
+
+impl Alive {
+    fn begin() -> Self {
+        Self {
+            due: Instant::now(),
+            ticks: 0,
+        }
+    }
+
+    /// The event, when it is time for one and the machine's thread has ticked since.
+    fn take(&mut self, desk: &Desk) -> Option<Sent> {
+        let now = Instant::now();
+        if now < self.due {
+            return None;
+        }
+        let beat = desk.beat();
+        if beat.ticks == self.ticks {
+            return None;
+        }
+        self.ticks = beat.ticks;
+        self.due = now + ALIVE_EVERY;
+        let data = json!({"clock_s": beat.clock_s});
+        Some(Sent::default().event("alive").data(data.to_string()))
+    }
 }
 
 impl Sampling {
@@ -80,7 +116,7 @@ impl Sampling {
     /// The axes, when it is time for them and the machine has ticked since.
     fn take(&mut self, desk: &Desk) -> Option<Sent> {
         let now = Instant::now();
-        let clock_s = desk.clock_s();
+        let clock_s = desk.beat().clock_s;
         if now < self.due || clock_s <= self.last_s {
             return None;
         }
@@ -92,7 +128,8 @@ impl Sampling {
     }
 }
 
-/// Events as they happen.
+/// Events as they happen. Each 500 ms an event `alive` without an id says that the machine's thread ticks; a client that
+/// hears none for 2 s knows nothing of the machine any more.
 #[utoipa::path(
     get, path = "/events", tag = "events",
     params(Wanted, ("Last-Event-ID" = Option<u64>, Header, description = "After the event of this number, as a browser says it")),
@@ -131,6 +168,7 @@ pub(super) async fn events(
         newest,
         waiting: VecDeque::new(),
         sample: every.map(Sampling::each),
+        alive: Alive::begin(),
         closing: shared.closing,
         _stream: place,
         _heard: keeps.map(|Extension(it)| it.heard()),
@@ -139,7 +177,7 @@ pub(super) async fn events(
         let sent = following.next().await?;
         Some((Ok(sent), following))
     });
-    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(ALIVE_EVERY)))
+    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(COMMENT_EVERY)))
 }
 
 /// The kinds with commas between, each of which there must be: a word that is misspelt would wait for ever.
@@ -221,6 +259,7 @@ impl Following {
         }
         let sample = self.sample.as_mut();
         self.waiting
-            .extend(sample.and_then(|it| it.take(&self.desk)));
+            .extend(sample.and_then(|sample| sample.take(&self.desk)));
+        self.waiting.extend(self.alive.take(&self.desk));
     }
 }

@@ -324,7 +324,18 @@ pub(super) struct Asks {
     /// 1000)`. Where the connection comes from when left out; the owner of the token where there is one.
     #[param(rename = "Truestage-Client")]
     client: Option<String>,
-    /// The token of the lease; without it orders are refused while somebody else has the lease.
+    /// The token of the lease; without it orders are refused while somebody else has the lease. One that has lapsed is refused,
+    /// too.
+    #[param(rename = "Truestage-Lease")]
+    lease: Option<String>,
+}
+
+/// What whoever only waits may say of himself, for the description.
+#[derive(Debug, IntoParams)]
+#[into_params(parameter_in = Header)]
+#[expect(dead_code, reason = "the description alone reads it")]
+pub(super) struct Waits {
+    /// The token of the lease, which does not lapse while its holder waits: each 5 s of the wait renew it.
     #[param(rename = "Truestage-Lease")]
     lease: Option<String>,
 }

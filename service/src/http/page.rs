@@ -10,7 +10,7 @@ use axum::routing::get;
 use super::state::State;
 
 /// Where each file is, what it is, and what it says.
-const FILES: [(&str, &str, &str); 4] = [
+const FILES: [(&str, &str, &str); 8] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -30,6 +30,26 @@ const FILES: [(&str, &str, &str); 4] = [
         "/curve.js",
         "text/javascript; charset=utf-8",
         include_str!("page/curve.js"),
+    ),
+    (
+        "/feed.js",
+        "text/javascript; charset=utf-8",
+        include_str!("page/feed.js"),
+    ),
+    (
+        "/stream.js",
+        "text/javascript; charset=utf-8",
+        include_str!("page/stream.js"),
+    ),
+    (
+        "/link.js",
+        "text/javascript; charset=utf-8",
+        include_str!("page/link.js"),
+    ),
+    (
+        "/stop.js",
+        "text/javascript; charset=utf-8",
+        include_str!("page/stop.js"),
     ),
 ];
 

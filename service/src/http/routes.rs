@@ -37,6 +37,8 @@ use crate::view::{Ending, StorageView};
 const WAIT_MAX: Duration = Duration::from_secs(300);
 /// How often an answer that is held back looks.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
+/// How often whoever waits with the token of the lease keeps it.
+const KEEP_EVERY: Duration = Duration::from_secs(5);
 
 #[derive(utoipa::OpenApi)]
 #[openapi(
@@ -191,9 +193,11 @@ pub(super) struct Wait {
 }
 
 impl Wait {
-    /// Asks until the end is on the disk or the time is over; once it has ended, no longer than a write may take.
+    /// Asks until the end is on the disk or the time is over, and does `keep` now and then; once it has ended, no
+    /// longer than a write may take.
     pub(super) async fn until<T: Ending>(
         self,
+        keep: impl Fn(),
         ask: impl Fn() -> Result<T, Problem>,
     ) -> Result<T, Problem> {
         let wait_s = self.wait_s.unwrap_or_default();
@@ -203,8 +207,10 @@ impl Wait {
             let help = "give seconds from 0 to 300";
             return Err(Problem::new(Code::BadRequest, what, help));
         }
-        let limit = tokio::time::Instant::now() + Duration::from_secs_f64(wait_s);
+        let begun = tokio::time::Instant::now();
+        let limit = begun + Duration::from_secs_f64(wait_s);
         let mut ended = None;
+        let mut keep_at = begun;
         loop {
             let (asked, now) = (ask()?, tokio::time::Instant::now());
             let is_over = asked.has_ended()
@@ -212,8 +218,20 @@ impl Wait {
             if is_over || now >= limit {
                 return Ok(asked);
             }
+            if now >= keep_at {
+                keep_at = now + KEEP_EVERY;
+                keep();
+            }
             tokio::time::sleep(LOOK_EVERY).await;
         }
+    }
+}
+
+/// Whoever waits with the token of the lease keeps it as long as his connection lives.
+pub(super) fn keep_lease(desk: &Desk, caller: &Caller) {
+    if caller.lease.is_some() {
+        // Where too many orders wait, the next time is soon enough.
+        let _ = desk.give(caller, Order::KeepLease);
     }
 }
 
@@ -258,4 +276,24 @@ pub(super) async fn obey_since(
 /// Gives an order and waits for its answer, without keeping anybody else waiting.
 pub(super) async fn obey(desk: &Desk, caller: &Caller, order: Order) -> Result<Answer, Problem> {
     desk.give(caller, order)?.answer().await
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn a_wait_keeps_the_lease_at_once_and_each_five_seconds() {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_time()
+            .start_paused(true)
+            .build();
+        let kept = Cell::new(0);
+        let wait = Wait { wait_s: Some(12.0) };
+        let waiting = wait.until(|| kept.set(kept.get() + 1), || Ok(()), |()| false);
+        runtime.unwrap().block_on(waiting).unwrap();
+        assert_eq!(kept.get(), 3, "at 0, 5 and 10 s");
+    }
 }

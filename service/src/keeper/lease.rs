@@ -16,7 +16,15 @@ use crate::view::Leased;
 pub(super) struct Lease {
     pub(super) name: Arc<str>,
     token: String,
+    /// How long it lasts after each sign of its holder.
+    lasts: Duration,
     pub(super) until: Time,
+}
+
+impl Lease {
+    fn is_of(&self, caller: &Caller) -> bool {
+        caller.lease.as_deref() == Some(&*self.token)
+    }
 }
 
 impl Keeper {
@@ -27,11 +35,19 @@ impl Keeper {
 
     /// Whether `caller` may command.
     pub(super) fn check_lease(&self, now: Time, caller: &Caller) -> Result<(), Problem> {
-        match self.holder(now) {
-            Some(lease) if caller.lease.as_deref() != Some(&*lease.token) => {
-                Err(leased_by(&lease.name))
-            }
-            _ => Ok(()),
+        match (self.holder(now), &caller.lease) {
+            (Some(lease), _) if lease.is_of(caller) => Ok(()),
+            (Some(lease), _) => Err(leased_by(&lease.name)),
+            (None, Some(_)) => Err(lapsed()),
+            (None, None) => Ok(()),
+        }
+    }
+
+    /// Whoever has the lease shows that he is there: it lasts as long again.
+    pub(super) fn keep_lease(&mut self, now: Time, caller: &Caller) {
+        let lease = self.lease.as_mut();
+        if let Some(lease) = lease.filter(|lease| lease.until > now && lease.is_of(caller)) {
+            lease.until = now + lease.lasts;
         }
     }
 
@@ -44,8 +60,8 @@ impl Keeper {
         token: String,
     ) -> Result<Leased, Problem> {
         let before = self.holder(now);
-        let is_own = before.is_some_and(|it| caller.lease.as_deref() == Some(&*it.token));
-        let until = now + Duration::from_secs(request.seconds.into());
+        let is_own = before.is_some_and(|lease| lease.is_of(caller));
+        let lasts = Duration::from_secs(request.seconds.into());
         let mut taken_from = None;
         let token = match before {
             Some(lease) if is_own => lease.token.clone(),
@@ -54,6 +70,8 @@ impl Keeper {
                 taken_from = Some(lease.name.to_string());
                 token
             }
+            // It would be renewed as if nobody could have commanded meanwhile.
+            None if caller.lease.is_some() && !request.force => return Err(lapsed()),
             None => token,
         };
         if !is_own {
@@ -63,7 +81,8 @@ impl Keeper {
         self.lease = Some(Lease {
             name: request.name.as_str().into(),
             token: token.clone(),
-            until,
+            lasts,
+            until: now + lasts,
         });
         Ok(Leased {
             token,
@@ -81,6 +100,15 @@ impl Keeper {
         }
         Ok(())
     }
+}
+
+fn lapsed() -> Problem {
+    Problem::new(
+        Code::LeaseLapsed,
+        "the lease of this token has lapsed, was given back or taken, or is of an earlier service; others may have \
+         commanded meanwhile",
+        "look what the machine does, and ask for the lease without the token",
+    )
 }
 
 fn leased_by(name: &str) -> Problem {

@@ -21,6 +21,7 @@ impl Keeper {
             arrival,
             reply,
         } = letter;
+        self.keep_lease(machine.now(), &caller);
         let allowed = match order.needs_lease() {
             true => self.check_lease(machine.now(), &caller),
             false => Ok(()),
@@ -49,6 +50,7 @@ impl Keeper {
                 self.warn(&text);
                 Ok(Answer::Done)
             }
+            Order::KeepLease => Ok(Answer::Done),
             Order::Release => self.release(machine.now(), &caller).map(|()| Answer::Done),
             Order::Move { id, request } => self
                 .accept_motion(machine, &id, by, &request)

@@ -18,6 +18,9 @@ use crate::view::{QuestionView, ToldView};
 /// The longest line that is an answer, in characters.
 const ANSWER_MAX: usize = 200;
 
+/// How a question is answered here.
+const ANSWERED: &str = "this is answered";
+
 /// What passes between a procedure that asks and whoever answers.
 #[derive(Debug, Default)]
 pub(super) struct Talk {
@@ -119,6 +122,10 @@ impl Keeper {
             answers: question.answers.iter().map(|it| (*it).to_owned()).collect(),
             takes_text: question.takes_text,
             by_hand: question.by_hand,
+            safety: question
+                .drives
+                .map(|drives| drives.warning(ANSWERED))
+                .unwrap_or_default(),
             task: question.task,
         };
         let (id, data) = (run.view.id.clone(), json!(question));

@@ -75,3 +75,65 @@ fn events_are_numbered_without_a_gap() {
         assert_eq!(bed.client.events(newest - 2).len(), 2);
     });
 }
+
+/// Whose lease it is by `token`.
+fn with(token: &str) -> Caller {
+    Caller {
+        lease: Some(token.to_owned()),
+        ..anna()
+    }
+}
+
+fn brief(seconds: u32) -> LeaseRequest {
+    LeaseRequest {
+        seconds,
+        ..lease("anna", false)
+    }
+}
+
+#[test]
+fn a_token_that_lapsed_or_is_unknown_is_refused() {
+    with_zeroed_stage(|bed| {
+        let leased = bed.client.lease(&anna(), &brief(1)).unwrap();
+        let begun = bed.client.machine().clock_s;
+        let id = bed
+            .client
+            .begin(&with(&leased.token), &slowly("x", 3.0), None)
+            .unwrap();
+        bed.ended(&id);
+        assert!(bed.client.machine().clock_s > begun + 1.0);
+        assert_eq!(bed.client.machine().lease, None);
+        for token in [&*leased.token, "0123456789abcdef0123456789abcdef"] {
+            let caller = with(token);
+            let refused = bed.client.begin(&caller, &to("x", 1.0), None).unwrap_err();
+            assert_eq!(refused.code, Code::LeaseLapsed, "{refused}");
+            let refused = bed.client.lease(&caller, &brief(1)).unwrap_err();
+            assert_eq!(refused.code, Code::LeaseLapsed, "{refused}");
+            let refused = bed.client.release(&caller).unwrap_err();
+            assert_eq!(refused.code, Code::LeaseLapsed, "{refused}");
+            bed.client.stop(&caller, StopMode::Controlled).unwrap();
+        }
+        let again = bed.client.lease(&anna(), &brief(60)).unwrap();
+        assert_ne!(again.token, leased.token);
+        bed.client.release(&with(&again.token)).unwrap();
+    });
+}
+
+#[test]
+fn each_order_of_its_holder_renews_a_lease() {
+    with_zeroed_stage(|bed| {
+        let leased = bed.client.lease(&anna(), &brief(5)).unwrap();
+        let holder = with(&leased.token);
+        let begun = bed.client.machine().clock_s;
+        for place in [1.0, 4.0].into_iter().cycle() {
+            let id = bed.client.begin(&holder, &to("x", place), None).unwrap();
+            assert_eq!(bed.ended(&id).state, MotionState::Done);
+            if bed.client.machine().clock_s > begun + 12.0 {
+                break;
+            }
+        }
+        let lease = bed.client.machine().lease.expect("it is held");
+        assert!(lease.seconds_left > 0.0, "{lease:?}");
+        bed.client.release(&holder).unwrap();
+    });
+}

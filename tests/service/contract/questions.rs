@@ -46,6 +46,9 @@ impl<'b> Hand<'b> {
 
     /// Does what is asked, and says so.
     pub(super) fn does(&mut self, id: &str, question: &QuestionView) {
+        for word in ["not a safe stop", "switched on"] {
+            assert!(question.safety.contains(word), "{question:?}");
+        }
         let offset = question.task["offset"].as_f64().expect("an offset");
         let lines = offset - self.lies_at;
         self.lies_at = offset;

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::failure::Failure;
 use crate::linear::job::{JobOperator, Reached};
-use crate::runs::{Person, Question, Told};
+use crate::runs::{DriveState, Person, Question, Told};
 
 /// What whoever keeps the machine calls it.
 pub(crate) const GO_ON: &str = "go_on";
@@ -19,10 +19,8 @@ pub(crate) struct Asking<'p> {
 impl JobOperator for Asking<'_> {
     fn ask(&mut self, text: &str) -> Result<(), Failure> {
         let task = json!({"text": text, "axis_holds": true});
-        let text = format!(
-            "{text}\nThe axis holds its place under power, and moves as soon as this is answered: be out of its way first."
-        );
-        self.person.ask(Question::of_work(GO_ON, text, task))
+        let question = Question::of_work(GO_ON, text.to_owned(), DriveState::Holding, task);
+        self.person.ask(question)
     }
 
     fn is_done(&mut self) -> Result<bool, Failure> {

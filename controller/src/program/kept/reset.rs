@@ -1,32 +1,49 @@
 //! Faults of a machine that a service keeps.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::{Service, refuse};
+use crate::Failure;
 use crate::program::AxisArgs;
 use crate::program::exchange::{ask_on, plain};
 use crate::program::output::{Ended, Output};
-use crate::program::session::choose_axis;
+use crate::program::reset::{AxisReset, meant, told};
+
+/// The state of an axis that a failure stopped.
+const STOPPED: &str = "ErrorStop";
 
 impl Service {
     /// Has the service start the machine anew, which acknowledges the fault of every drive; what is told is the axis
-    /// that was named. Nothing moves.
+    /// that was named, or each that was stopped. Nothing moves.
     pub(crate) fn reset(&self, args: &AxisArgs, output: Output) -> Ended {
         refuse(args.machine.record.is_some(), "--record")?;
-        let axes = ask_on(&self.at, "GET", "/v1/axes", "")?;
-        let all = || axes.as_array().into_iter().flatten();
-        let axis = choose_axis(all().map(|it| text(&it["name"])).collect(), args)?;
-        let seen = all().find(|it| text(&it["name"]) == axis);
-        let before = seen.map_or_else(String::new, |it| text(&it["state"]));
+        let before = self.axis_states()?;
+        let names = before.iter().map(|(name, _)| name.clone()).collect();
+        let meant = meant(names, args)?;
         ask_on(&self.at, "POST", "/v1/reset", "{}")?;
-        let seen = ask_on(&self.at, "GET", &format!("/v1/axes/{axis}"), "")?;
-        let after = text(&seen["state"]);
-        let told = format!(
-            "axis {axis}: was in {before}, is now in {after}; the service has acknowledged every drive's fault: zero each axis \
-             before it moves"
-        );
-        let value = json!({"axis": axis, "before": before, "after": after});
-        output.result(&told, &value)
+        let both = before.into_iter().zip(self.axis_states()?);
+        let resets = both.map(|((axis, before), (_, after))| AxisReset {
+            axis,
+            before,
+            after,
+        });
+        let is_told = |reset: &AxisReset| match &meant {
+            Some(meant) => *meant == reset.axis,
+            None => reset.before == STOPPED,
+        };
+        let resets: Vec<_> = resets.filter(is_told).collect();
+        let zero =
+            "the service has acknowledged every drive's fault: zero each axis before it moves";
+        let (text, value) = told(meant.as_deref(), &resets, zero);
+        output.result(&text, &value)
+    }
+
+    /// The name of each axis, and what it does.
+    fn axis_states(&self) -> Result<Vec<(String, String)>, Failure> {
+        let axes = ask_on(&self.at, "GET", "/v1/axes", "")?;
+        let axes = axes.as_array().into_iter().flatten();
+        let states = axes.map(|axis| (text(&axis["name"]), text(&axis["state"])));
+        Ok(states.collect())
     }
 }
 

@@ -17,6 +17,7 @@ pub(super) fn targets(args: &MoveArgs) -> Result<Vec<(String, Radians)>, Failure
             help: "write AXIS=ANGLE with a unit: c=90deg".into(),
         });
     }
+    args.each_once()?;
     args.targets.iter().map(|text| target(text)).collect()
 }
 

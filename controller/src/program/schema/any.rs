@@ -131,6 +131,13 @@ fn machines() -> Vec<Form> {
         )
         .counted(),
     ];
+    let each = list(object([
+        ("axis", text()),
+        ("before", text()),
+        ("after", text()),
+    ]));
+    let all = "the faults that were acknowledged, where no axis is named";
+    forms.push(Form::new("reset", all, [("resets", each)]).counted());
     forms.extend(["zero", "calibrate", "verify", "move", "jog"].map(dry_run));
     let untold = [
         "zero",

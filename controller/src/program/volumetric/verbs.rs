@@ -291,6 +291,7 @@ fn mm(point: Point) -> [f64; 3] {
 
 /// The targets of a move of three axes.
 pub(super) fn targets(args: &MoveArgs) -> Result<NamedPoint, Failure> {
+    args.each_once()?;
     let mut target: [Option<Metres>; 3] = [None; 3];
     for text in &args.targets {
         let (axis, place) = axis_target(text)?;

@@ -190,3 +190,46 @@ fn what_cannot_follow_is_refused_with_its_line() {
     let line = matches!(refused, StoreError::Unsound { line: Some(3), .. });
     assert!(line, "{refused}");
 }
+
+/// Whoever can write into the folder has put it there.
+fn refusal_of(path: &Path) -> String {
+    let refused = read(path).unwrap_err().to_string();
+    let entries = read_entries(path).unwrap_err().to_string();
+    assert_eq!(entries, refused);
+    refused
+}
+
+#[test]
+fn only_regular_files_of_bounded_size_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = create(folder.path());
+    let at = |name: &str| folder.path().join(name);
+    nix::unistd::mkfifo(&at("fifo"), nix::sys::stat::Mode::S_IRWXU).unwrap();
+    assert!(refusal_of(&at("fifo")).contains("no regular file"));
+    std::os::unix::fs::symlink(journal.path(), at("link")).unwrap();
+    assert!(refusal_of(&at("link")).contains("symbolic link"));
+    assert!(refusal_of(folder.path()).contains("no regular file"));
+    let sparse = File::create(at("sparse")).unwrap();
+    sparse.set_len(3 << 30).unwrap();
+    assert!(refusal_of(&at("sparse")).contains("3221225472 bytes"));
+    // Short enough, and one line of zeros.
+    sparse.set_len(JOURNAL_MAX).unwrap();
+    assert!(refusal_of(&at("sparse")).contains("the line has no end"));
+}
+
+#[test]
+fn a_last_line_whose_checksum_is_right_and_whose_json_is_not_is_torn() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = create(folder.path());
+    journal.write(&Reading::Point { run: 1 }).unwrap();
+    let path = journal.path().to_owned();
+    let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+    let (_, whole) = read_entries(&path).unwrap();
+    for wrong in [r#"{"entry":"point","run":}"#, r#"{"run":1}"#] {
+        file.write_all(sealed(wrong).as_bytes()).unwrap();
+        let (read, entries) = read_entries(&path).unwrap();
+        assert!(read.torn, "{wrong}");
+        assert_eq!(entries, whole, "{wrong}");
+        file.set_len(read.valid_bytes).unwrap();
+    }
+}

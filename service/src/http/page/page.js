@@ -3,12 +3,22 @@
 "use strict";
 
 import { Trace, draw, ofRun } from "/curve.js";
+import { EVENTS_SHOWN } from "/feed.js";
+import { listen } from "/link.js";
+import { Stop } from "/stop.js";
 
 const LEASE_S = 10;
 const RENEW_MS = 3000;
 // The service stops a jog 200 ms after the last word.
 const JOG_MS = 60;
-const EVENTS_SHOWN = 60;
+// A live service is heard each 500 ms.
+const SILENT_MS = 2000;
+const LOOK_MS = 250;
+// A question that has no answer by then keeps one of the browser's six connections from a stop.
+const ANSWER_MS = 2000;
+const ORDER_MS = 60000;
+// Changes of the machine that come together are asked for once.
+const TOGETHER_MS = 30;
 const LIVE_S = 20;
 // What is asked for with a text: where it goes, and what it is.
 const ALONG = { path: ["path", "Rows: time_s,x_mm,y_mm,z_mm"], first_part: ["path", "Rows: time_s,x_mm,y_mm,z_mm"],
@@ -21,6 +31,13 @@ let holder = null;
 let sure = false;
 let renewing = null;
 let renewal = null;
+// What the service said of the machine, when it was heard last, and whether its connection is lost.
+let machineText = "connecting …";
+let machineKind = "";
+let heard = performance.now();
+let isLost = false;
+let lookingAt = null;
+const onTheirWay = new Set();
 const plans = new Map();
 const together = new Set();
 const traces = new Map();
@@ -30,10 +47,30 @@ async function ask(method, path, body) {
   if (renewal && method !== "GET" && path !== "/v1/lease" && path !== "/v1/stop") await renewal;
   const headers = { "content-type": "application/json", "truestage-client": "page" };
   if (token) headers["truestage-lease"] = token;
-  const answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
-  const value = await answer.json();
-  if (!answer.ok) throw Object.assign(new Error(value.detail), { code: value.code });
-  return value;
+  const way = new AbortController();
+  const limit = method === "GET" || path === "/v1/lease" ? ANSWER_MS : ORDER_MS;
+  const late = setTimeout(() => way.abort(new Error(`no answer for ${limit / 1000} s`)), limit);
+  onTheirWay.add(way);
+  try {
+    const said = body === undefined ? undefined : JSON.stringify(body);
+    const answer = await fetch(path, { method, headers, body: said, signal: way.signal });
+    const value = await answer.json();
+    if (answer.ok) return value;
+    if (value.code === "lease_lapsed") lose();
+    throw Object.assign(new Error(value.detail), { code: value.code });
+  } finally {
+    clearTimeout(late);
+    onTheirWay.delete(way);
+  }
+}
+
+const stopping = new Stop(byId("stop-answer"));
+
+// Nothing that waits for an answer stands in its way.
+function stop() {
+  for (const way of onTheirWay) way.abort(new Error("STOP was pressed before this had an answer"));
+  byId("problem").textContent = "";
+  stopping.press();
 }
 
 // What goes wrong is said in one place.
@@ -49,11 +86,24 @@ function showMachine(machine) {
   byId("name").textContent = `${machine.name} · ${machine.stage_serial}`;
   document.title = `${machine.name} – truestage`;
   const cause = machine.cause ? `: ${machine.cause.cause}` : "";
-  byId("state").textContent = machine.state.replace("_", " ") + cause;
-  byId("state").className = machine.state === "error_stop" ? "failed" : "";
+  machineText = machine.state.replace("_", " ") + cause;
+  machineKind = machine.state === "error_stop" ? "failed" : "";
+  showState();
   holder = machine.lease ? machine.lease.name : null;
   showTake();
   showGroups(machine.groups);
+}
+
+// What was heard is shown as long as the machine's thread says that it lives.
+function showState() {
+  const silence = performance.now() - heard;
+  const isSilent = silence > SILENT_MS;
+  document.body.classList.toggle("silent", isSilent || isLost);
+  const nothing = isSilent ? `nothing heard for ${Math.floor(silence / 1000)} s` : "trying again …";
+  const text = isLost ? `connection lost; ${nothing}` : nothing;
+  const [shown, kind] = isSilent || isLost ? [text, "unheard"] : [machineText, machineKind];
+  if (byId("state").textContent !== shown) byId("state").textContent = shown;
+  byId("state").className = kind;
 }
 
 // Axes that never move by themselves have one form for all of them.
@@ -127,7 +177,6 @@ async function take() {
 
 async function renew() {
   try {
-    // One that came too late is given a new lease, if nobody else has it.
     token = (await ask("POST", "/v1/lease", { name: "page", seconds: LEASE_S })).token;
   } catch (error) {
     lose();
@@ -293,10 +342,11 @@ function button(text, act) {
 
 // What a run asks, with a button for each answer, and a line for what was read.
 function asking(run) {
-  const { number: question, text, answers, takes_text: takes } = run.question;
+  const { number: question, text, answers, takes_text: takes, safety } = run.question;
   const shown = element("div", "", "question");
   const say = (answer) => ask("POST", `/v1/runs/${run.id}/answers`, { question, answer });
   shown.append(...text.split("\n").map((line) => element("p", line)));
+  if (safety) shown.append(element("p", safety, "failed"));
   if (takes) {
     const [form, input] = [document.createElement("form"), document.createElement("input")];
     input.required = true;
@@ -422,26 +472,40 @@ async function showAll() {
   showControl();
 }
 
-function follow(after) {
-  // The browser connects again by itself, with the number of the last event that it has heard.
-  const stream = new EventSource(`/v1/events?sample_ms=100&after=${after}`);
-  stream.addEventListener("open", () => told(showAll()));
-  stream.addEventListener("error", () => { byId("state").textContent = "connection lost; trying again …"; });
-  stream.addEventListener("sample", (message) => showAxes(JSON.parse(message.data)));
-  for (const kind of ["machine", "axis", "position", "motion", "run", "question", "point", "stop", "lease", "calibration", "warning"]) {
-    stream.addEventListener(kind, async (message) => {
-      const event = JSON.parse(message.data);
-      showEvent(event);
-      if (kind === "machine" || kind === "lease") showMachine(await ask("GET", "/v1/machine"));
-      if (kind === "run") showRun({ ...plans.get(event.of), ...event.data });
-      if (kind === "point" && plans.has(event.of)) showRun({ ...plans.get(event.of), reached: [event.data.text] });
-      if (kind === "question") showRun({ ...plans.get(event.of), question: event.data.answer ? null : event.data });
-    });
-  }
+function lookAtMachine() {
+  clearTimeout(lookingAt);
+  lookingAt = setTimeout(() => ask("GET", "/v1/machine").then(showMachine).catch(() => {}), TOGETHER_MS);
 }
 
-byId("stop").addEventListener("click", () => told(ask("POST", "/v1/stop", {})));
-document.addEventListener("keydown", (event) => { if (event.key === "Escape") told(ask("POST", "/v1/stop", {})); });
+function hear(kind, data) {
+  if (kind === "open" || kind === "lost") isLost = kind === "lost";
+  if (kind === "open") told(showAll());
+  if (kind === "alive") [heard, isLost] = [performance.now(), false];
+  if (kind === "open" || kind === "lost" || kind === "alive") {
+    showState();
+    return;
+  }
+  const said = JSON.parse(data);
+  if (kind === "sample") {
+    showAxes(said);
+    return;
+  }
+  showEvent(said);
+  // What was before this page listened is in what it asks for.
+  if (kind === "machine" || kind === "lease") lookAtMachine();
+  if (kind === "run") showRun({ ...plans.get(said.of), ...said.data });
+  if (kind === "point" && plans.has(said.of)) showRun({ ...plans.get(said.of), reached: [said.data.text] });
+  if (kind === "question") showRun({ ...plans.get(said.of), question: said.data.answer ? null : said.data });
+}
+
+// Of the time before nothing was heard here.
+function looked() {
+  heard = performance.now();
+  byId("events").replaceChildren();
+}
+
+byId("stop").addEventListener("click", stop);
+document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !event.repeat) stop(); });
 byId("take").addEventListener("click", () => told(take()));
 byId("take").addEventListener("blur", () => { sure = false; showTake(); });
 byId("give").addEventListener("click", () => told(give()));
@@ -479,4 +543,5 @@ function showAlong() {
 
 showAlong();
 showControl();
-told(showAll().then(() => ask("GET", "/v1/machine")).then((machine) => follow(Math.max(0, machine.newest_event - EVENTS_SHOWN))));
+setInterval(showState, LOOK_MS);
+listen(hear, looked);

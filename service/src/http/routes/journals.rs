@@ -1,9 +1,14 @@
 //! Journals of runs, and their pages.
 
+use std::fs::File;
+use std::io::{self, Read as _, Take};
+
 use axum::Json;
+use axum::body::Body;
 use axum::extract::State as Of;
 use axum::http::header;
 use axum::response::IntoResponse;
+use futures_util::stream;
 
 use super::super::guard::Named;
 use super::super::state::State;
@@ -14,6 +19,9 @@ use crate::view::JournalView;
 /// A page of a run has everything in itself and runs nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; \
                       form-action 'none'; frame-ancestors 'none'";
+
+/// So many bytes of a journal are in memory at once.
+const PIECE: usize = 64 << 10;
 
 /// The newest hundred journals of runs, the newest first.
 #[utoipa::path(
@@ -40,8 +48,23 @@ pub(super) async fn journal(
     Of(state): Of<State>,
     Named(name): Named,
 ) -> Result<impl IntoResponse, Problem> {
-    let said = from_disk(state, move |desk| desk.journal(&name)).await?;
-    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], said))
+    let file = from_disk(state, move |desk| desk.journal_file(&name)).await?;
+    let headers = [
+        (header::CONTENT_TYPE, "text/plain; charset=utf-8".to_owned()),
+        (header::CONTENT_LENGTH, file.limit().to_string()),
+    ];
+    let said = Body::from_stream(stream::try_unfold(file, next_piece));
+    Ok((headers, said))
+}
+
+/// The next bytes of a file, `None` at its end, while others are served.
+async fn next_piece(mut file: Take<File>) -> io::Result<Option<(Vec<u8>, Take<File>)>> {
+    let reading = tokio::task::spawn_blocking(move || {
+        let mut piece = Vec::with_capacity(PIECE);
+        file.by_ref().take(PIECE as u64).read_to_end(&mut piece)?;
+        Ok((!piece.is_empty()).then_some((piece, file)))
+    });
+    reading.await.map_err(io::Error::other)?
 }
 
 /// The page of a run: what `truestage report` makes of its journal.

@@ -5,9 +5,9 @@ use axum::extract::State as Of;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 
-use super::super::guard::{Arrived, Asks, Body, By, Named, has_key, key_of};
+use super::super::guard::{Arrived, Asks, Body, By, Named, Waits, has_key, key_of};
 use super::super::state::State;
-use super::{MaybeQuery, Wait, obey, obey_since, query};
+use super::{MaybeQuery, Wait, keep_lease, obey, obey_since, query};
 use crate::desk::named;
 use crate::ledger::Noted;
 use crate::order::Order;
@@ -70,7 +70,7 @@ pub(super) async fn begin(
 
 /// A motion, once it has ended or the time to wait is over.
 #[utoipa::path(
-    get, path = "/motions/{id}", tag = "motions", params(("id" = String, Path, description = "Its name"), Wait),
+    get, path = "/motions/{id}", tag = "motions", params(("id" = String, Path, description = "Its name"), Wait, Waits),
     responses(
         (status = 200, description = "The motion", body = MotionView),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
@@ -78,10 +78,14 @@ pub(super) async fn begin(
 )]
 pub(super) async fn motion(
     Of(state): Of<State>,
+    By(caller): By,
     Named(id): Named,
     wait: MaybeQuery<Wait>,
 ) -> Result<Json<MotionView>, Problem> {
-    let asked = query(wait)?.until(|| state.desk.motion(&id));
+    let asked = query(wait)?.until(
+        || keep_lease(&state.desk, &caller),
+        || state.desk.motion(&id),
+    );
     Ok(Json(asked.await?))
 }
 

@@ -7,11 +7,11 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::super::guard::{Arrived, Asks, Body, By, Named, key_of};
+use super::super::guard::{Arrived, Asks, Body, By, Named, Waits, key_of};
 use super::super::identity::Admitted;
 use super::super::needs::{enough, of_run};
 use super::super::state::State;
-use super::{MaybeQuery, Wait, obey, obey_since, query};
+use super::{MaybeQuery, Wait, keep_lease, obey, obey_since, query};
 use crate::desk::Prepared;
 use crate::order::Order;
 use crate::problem::{Code, Problem, ProblemBody};
@@ -100,7 +100,7 @@ impl Looked {
 
 /// A run, once it has ended or the time to wait is over.
 #[utoipa::path(
-    get, path = "/runs/{id}", tag = "runs", params(("id" = String, Path, description = "Its name"), Looked),
+    get, path = "/runs/{id}", tag = "runs", params(("id" = String, Path, description = "Its name"), Looked, Waits),
     responses(
         (status = 200, description = "The run", body = RunView),
         (status = "4XX", description = "There is none", body = ProblemBody, content_type = "application/problem+json"),
@@ -108,12 +108,13 @@ impl Looked {
 )]
 pub(super) async fn run(
     Of(state): Of<State>,
+    By(caller): By,
     Named(id): Named,
     looked: MaybeQuery<Looked>,
 ) -> Result<Json<RunView>, Problem> {
     let looked = query(looked)?;
     let (left_out, wait_s) = (looked.left_out()?, looked.wait_s);
-    let asked = Wait { wait_s }.until(|| state.desk.run(&id));
+    let asked = Wait { wait_s }.until(|| keep_lease(&state.desk, &caller), || state.desk.run(&id));
     let mut run = asked.await?;
     run.reached.drain(..left_out.min(run.reached.len()));
     Ok(Json(run))
