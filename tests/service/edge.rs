@@ -364,7 +364,8 @@ fn what_there_is_is_described_and_counted() {
         assert_eq!(description["openapi"], "3.1.0");
         assert!(description["paths"]["/v1/motions"]["post"].is_object());
         let health: Value = http.ask("GET /healthz HTTP/1.1", b"").json();
-        assert_eq!(health, json!({"state": "running"}));
+        let storage = json!({"ok": true, "cause": null, "damaged": null});
+        assert_eq!(health, json!({"state": "running", "storage": storage}));
         let metrics = http.ask("GET /metrics HTTP/1.1", b"");
         let text = String::from_utf8(metrics.body).unwrap();
         assert!(text.contains("truestage_running 1\n"), "{text}");
