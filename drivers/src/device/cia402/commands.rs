@@ -54,8 +54,9 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
         self.state()
     }
 
+    /// A drive that nothing is heard of may have lost its power, and its home with that.
     fn is_homed(&self) -> bool {
-        self.homed
+        self.homed && self.node.is_in_service()
     }
 
     fn watches_master(&self) -> bool {
