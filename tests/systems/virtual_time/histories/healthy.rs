@@ -108,7 +108,7 @@ impl Servo {
         Self {
             speed: over(dice, speeds.0, speeds.1),
             acceleration,
-            quick_stop: acceleration * over(dice, 1.0, 4.0),
+            quick_stop: acceleration * over(dice, 1.0, 2.0),
             bandwidth_hz: over(dice, 10.0, 200.0),
             damping: dice.between(0.6, 1.2),
             feed_forward: dice.between(0.8, 1.0),

@@ -174,12 +174,15 @@ impl Judge {
     pub(super) fn allow_slowing(&mut self, simulation: &mut Simulation, asked: String) {
         let (here, speed) = self.state(simulation);
         let now = simulation.now();
-        // Until the drive has the controlword, and brakes, its axis goes on and may still speed up.
+        // Until the drive has the controlword its axis goes on and may still speed up; with a jerk, until
+        // its acceleration has turned into a deceleration.
+        let (jerk, reaction) = (self.facts.jerk, self.facts.reaction);
         let acceleration = self.deceleration(simulation);
-        let reaction = self.facts.reaction + acceleration / (2.0 * self.facts.jerk);
         let most = self.allowed.speed.max(speed);
-        let fastest = (speed + acceleration * reaction).min(most);
-        let way = fastest * reaction;
+        let heard = (speed + acceleration * reaction).min(most);
+        let fastest = (heard + acceleration * acceleration / (2.0 * jerk)).min(most);
+        let turning = 2.0 * (fastest - heard) / acceleration + acceleration / (2.0 * jerk);
+        let way = fastest * (reaction + turning);
         self.allow(simulation, (here - way, here + way), fastest, asked);
         self.allowed.speed = self.allowed.speed.max(self.facts.standing_speed);
         self.allowed.stands_by = Some(now + STANDS_AFTER);

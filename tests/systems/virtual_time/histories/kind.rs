@@ -165,6 +165,16 @@ impl Kind {
         }
     }
 
+    /// The other way round to the same place, where it is longer by `slack` at most; else `way` itself.
+    pub(super) fn way_around(&self, way: f64, slack: f64) -> f64 {
+        const TURN: f64 = core::f64::consts::TAU;
+        if self.turns && TURN - 2.0 * way.abs() <= 2.0 * slack {
+            way - TURN.copysign(way)
+        } else {
+            way
+        }
+    }
+
     pub(super) fn text(&self, place: f64) -> String {
         let axis = &self.axes[0];
         format!("{:.3} {}", place / axis.per_unit, axis.unit)

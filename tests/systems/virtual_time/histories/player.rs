@@ -458,14 +458,15 @@ impl Player<'_> {
 
     /// The way to `target`, from where the axis is.
     fn allow_move(&self, axis: usize, target: f64, speed: f64, asked: String) {
-        let kind = self.kind;
+        let (kind, facts) = (self.kind, self.axis(axis));
         let (shown, here) = self.place(axis);
         let way = kind.way(shown, target);
         self.judge(axis, |judge, simulation| {
-            // A superseded motion slows down first.
+            // A superseded motion slows down first, after which the other way round may be the shorter one.
             let now = judge.state(simulation).1.max(speed);
-            let low = here + way.min(0.0) - kind.approach;
-            let high = here + way.max(0.0) + kind.approach;
+            let around = kind.way_around(way, now * now / facts.acceleration);
+            let low = here + way.min(around).min(0.0) - kind.approach;
+            let high = here + way.max(around).max(0.0) + kind.approach;
             judge.allow(simulation, (low, high), now, asked);
         });
     }
