@@ -3,7 +3,7 @@
 use units::{Coordinate, Time};
 use wire::cia402::{OperationMode, PowerState, Statusword};
 
-use super::homing::HomingPlace;
+use super::homing_place::HomingPlace;
 use super::{Activity, Cia402Drive};
 use crate::device::{
     Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, DriveReference, ReferenceLost,

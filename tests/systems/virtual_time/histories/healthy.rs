@@ -246,7 +246,11 @@ fn draw_rotary(dice: &mut Dice) -> Drawn {
 fn draw_volumetric(dice: &mut Dice) -> Drawn {
     // Its slides search at 20 mm/s.
     let servo = Servo::draw(dice, (20.0, 190.0), (3000.0, 9000.0));
-    let limit_um = (servo.lag(20.0) * 1e3 * over(dice, 3.0, 20.0)).clamp(100.0, 5000.0);
+    let period_ms = dice.one_of(&[4.0, 5.0, 10.0]);
+    // Between two set-points the speed is constant.
+    let by_steps = servo.acceleration * period_ms * 1e-3 / (TAU * servo.bandwidth_hz);
+    let lag = servo.lag(20.0) + by_steps;
+    let limit_um = (lag * 1e3 * over(dice, 3.0, 20.0)).clamp(100.0, 5000.0);
     let window_um = over(dice, 0.1, 5.0);
     let mut emulated = servo.plant_keys();
     emulated.extend([
@@ -266,10 +270,7 @@ fn draw_volumetric(dice: &mut Dice) -> Drawn {
             ..THREE_AXES
         },
         machine: vec![
-            (
-                "sync_period_ms",
-                format!("{:?}", dice.one_of(&[4.0, 5.0, 10.0])),
-            ),
+            ("sync_period_ms", format!("{period_ms:?}")),
             ("speed_mm_per_s", format!("{:?}", servo.speed)),
             (
                 "acceleration_mm_per_s2",
