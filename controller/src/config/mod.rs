@@ -54,7 +54,9 @@ pub use model::MachineConfig;
 // What the rest of this package uses.
 pub(crate) use crate::hardware::analog::*;
 pub(crate) use crate::hardware::bus::{CanBus, CanTransport};
-pub(crate) use crate::hardware::drive::cia402::{HomeOffsetName, OptionCodesConfig};
+pub(crate) use crate::hardware::drive::cia402::{
+    AccelerationUnitName, HomeOffsetName, OptionCodesConfig, SpeedUnitName,
+};
 pub(crate) use crate::hardware::drive::*;
 pub(crate) use crate::hardware::instrument::*;
 pub(crate) use crate::hardware::node::IdentityConfig;

@@ -6,7 +6,7 @@ use compensator::rotary::{self, Criterion, Design, PlanError, Sighted};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::config::{HomeOffsetName, OptionCodesConfig};
+use crate::config::{AccelerationUnitName, HomeOffsetName, OptionCodesConfig, SpeedUnitName};
 use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::node::NodeConfig;
 
@@ -116,6 +116,10 @@ pub struct RotaryConfig {
     /// As for a linear axis.
     #[serde(default)]
     pub option_codes: OptionCodesConfig,
+    /// As for a linear axis.
+    pub speed_unit: Option<SpeedUnitName>,
+    /// As for a linear axis.
+    pub acceleration_unit: Option<AccelerationUnitName>,
     /// As for a linear axis.
     pub kept_zero: Option<KeptZeroConfig>,
     /// How it gets its origin: the encoder's index mark.

@@ -16,7 +16,7 @@ use wire::Port;
 use crate::config::{CanBus, MachineConfig};
 use crate::failure::Failure;
 use crate::hardware::drive::HOLD_SHARE;
-use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive};
+use crate::hardware::drive::cia402::{home_offset, option_codes, patient_drive, stated_units};
 use crate::hardware::kept_zero::KeptZeroConfig;
 use crate::hardware::{CHECKED, millis};
 use crate::rotary::failure::RotaryFailure;
@@ -92,6 +92,7 @@ pub fn rotary_settings(
         stall_max: patience.beyond(usual.common.sync_period),
         home_offset: home_offset(rotary.home_offset),
         reference_proof: rotary.kept_zero.as_ref().map(KeptZeroConfig::proof),
+        stated_units: stated_units(rotary.speed_unit, rotary.acceleration_unit),
         options: option_codes(&rotary.option_codes, usual.options),
         timeouts: patient_drive(
             Cia402Timeouts {

@@ -69,6 +69,14 @@ impl Profile {
             acceleration: acceleration.abs().value() / count,
         }
     }
+
+    /// What was written to a drive, in counts.
+    pub(super) fn written(speed: u32, acceleration: u32) -> Self {
+        Self {
+            speed: f64::from(speed),
+            acceleration: f64::from(acceleration),
+        }
+    }
 }
 
 /// The hold limit of an axis in counts: a tenth of its `lag` where none is set, at least its `window`.
@@ -134,6 +142,8 @@ pub(super) struct Envelope {
     samples: u32,
     /// Beyond the speed asked for, with growing and with falling counts.
     excess: [f64; 2],
+    /// The largest part of that which one span alone has brought.
+    largest: [f64; 2],
     /// While homing, the last position that the speed allows, and one after that which it does not.
     good: Option<Point>,
     odd: Option<i64>,
@@ -151,6 +161,7 @@ impl Envelope {
             mark: None,
             samples: 0,
             excess: [0.0; 2],
+            largest: [0.0; 2],
             good: None,
             odd: None,
             impossible: 0,
@@ -332,17 +343,22 @@ impl Envelope {
         let moved = (sample.position - mark.position) as f64;
         let allowed = profile.speed * SPEED_MARGIN * span.as_secs_f64();
         (self.mark, self.samples) = (Some(sample), 0);
-        for (excess, way) in self.excess.iter_mut().zip([moved, -moved]) {
+        let sums = self.excess.iter_mut().zip(&mut self.largest);
+        for ((excess, largest), way) in sums.zip([moved, -moved]) {
             let beyond = way - allowed;
+            *largest = largest.max(beyond);
             *excess = match *excess < 0.0 {
                 true => *excess + beyond.max(0.0),
                 false => (*excess + beyond).max(0.0),
             };
         }
-        let is_beyond = self
-            .excess
-            .iter()
-            .any(|excess| *excess > self.figures.hold_limit as f64);
+        // A search may change its coordinates once, by less than a step.
+        let is_search = asked == Asked::Homing;
+        let once = self
+            .largest
+            .map(|largest| if is_search { largest } else { 0.0 });
+        let mut sums = self.excess.iter().zip(once);
+        let is_beyond = sums.any(|(excess, once)| excess - once > self.figures.hold_limit as f64);
         is_beyond.then(|| Departure::Speed {
             asked,
             limit: profile.speed,
@@ -445,7 +461,7 @@ impl Envelope {
             profile,
         };
         (self.mark, self.samples) = (Some(here), 0);
-        self.excess = [0.0; 2];
+        (self.excess, self.largest) = ([0.0; 2], [0.0; 2]);
         (self.good, self.odd, self.impossible) = (Some(here), None, 0);
         self.stepped = None;
     }
@@ -642,6 +658,19 @@ mod tests {
             judge(&mut fast, way),
             Some(Departure::Speed { .. })
         ));
+    }
+
+    #[test]
+    fn a_small_change_of_coordinates_is_no_speed() {
+        let mut homing = envelope();
+        homing.begin_homing(START, 100_000, PROFILE);
+        let way = (1..100).map(|sample| f64::from(sample) * 50.0);
+        let after = (100..200).map(|sample| f64::from(sample) * 50.0 + 90.0);
+        assert_eq!(judge(&mut homing, way.chain(after)), None);
+        let mut fast = envelope();
+        fast.begin_homing(START, 100_000, PROFILE);
+        let way = (1..100).map(|sample| f64::from(sample) * 65.0);
+        assert!(judge(&mut fast, way).is_some(), "each span is beyond");
     }
 
     #[test]

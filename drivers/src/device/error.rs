@@ -112,6 +112,17 @@ pub enum DeviceError {
         above: u32,
         below: u32,
     },
+    /// The first motion of a drive that states no units was not what was asked for.
+    #[error(
+        "{node}: the first motion had {factor:.2} times the {what} that was asked for, which fits {fits}; set \
+         the drive to position units per second (0x60A9, 0x60AA, or its maker's program)"
+    )]
+    UnitSeen {
+        node: NodeId,
+        what: &'static str,
+        factor: f64,
+        fits: &'static str,
+    },
     /// Something that was awaited did not come.
     #[error("{device}: waited {} for {awaited}, last saw {seen}", units::ShortSpan(*waited))]
     Timeout {

@@ -7,6 +7,7 @@
 //! `HISTORIES` is how many are played, `HISTORY` the only one that is played, with its story.
 
 mod draw;
+mod healthy;
 mod judge;
 mod kind;
 mod player;

@@ -30,6 +30,7 @@ mod serial_zero;
 mod survey;
 mod table_uncertainty;
 mod thermometer_share;
+mod unread_units;
 mod volumetric;
 mod volumetric_cameras;
 mod volumetric_cause;

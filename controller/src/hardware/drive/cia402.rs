@@ -1,8 +1,8 @@
 //! Servo drives of CiA 402, and what a rotary axis has of them, too.
 
 use drivers::device::cia402::{
-    Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes, interpolation_period,
-    period_from,
+    Cia402Drive, Cia402Settings, Cia402Timeouts, HomeOffset, OptionCodes, StatedUnits,
+    interpolation_period, period_from,
 };
 use drivers::device::{Axis, Identity};
 use machine::Patience;
@@ -36,6 +36,11 @@ pub struct Cia402AxisConfig {
     /// back), so that a group starts at the same SYNC; a quick stop is up to one SYNC later.
     #[serde(default)]
     pub synchronous_start: bool,
+    /// The unit of its speeds, for a drive that does not say so (0x60A9): with both units the first motion after a start is
+    /// as fast as asked, otherwise slow until it was measured. Another unit than position units a second is refused.
+    pub speed_unit: Option<SpeedUnitName>,
+    /// Likewise of its accelerations (0x60AA).
+    pub acceleration_unit: Option<AccelerationUnitName>,
     /// How the drive proves at a start that it has kept its zero; without it an axis is zeroed after each start.
     pub kept_zero: Option<KeptZeroConfig>,
     /// The axis can follow cyclic set-points.
@@ -51,6 +56,22 @@ pub enum HomeOffsetName {
     PositionAtHome,
     /// The way from home to zero, as CiA 402 has it.
     ZeroFromHome,
+}
+
+/// What a drive counts speeds in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SpeedUnitName {
+    /// Position units a second.
+    CountsPerS,
+}
+
+/// What a drive counts accelerations in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum AccelerationUnitName {
+    /// Position units a second, each second.
+    #[serde(rename = "counts_per_s2")]
+    CountsPerS2,
 }
 
 /// The option codes of CiA 402; what is absent stays as the drive has it.
@@ -104,6 +125,7 @@ impl Cia402AxisConfig {
             stall_max: patience.beyond(usual.common.sync_period),
             home_offset: home_offset(self.home_offset),
             reference_proof: self.kept_zero.as_ref().map(KeptZeroConfig::proof),
+            stated_units: stated_units(self.speed_unit, self.acceleration_unit),
             options: option_codes(&self.option_codes, usual.options),
             synchronous_start: self.synchronous_start,
             timeouts: patient_drive(
@@ -195,6 +217,16 @@ pub(crate) const fn home_offset(name: HomeOffsetName) -> HomeOffset {
     match name {
         HomeOffsetName::PositionAtHome => HomeOffset::IsPositionAtHome,
         HomeOffsetName::ZeroFromHome => HomeOffset::IsZeroFromHome,
+    }
+}
+
+pub(crate) const fn stated_units(
+    speed: Option<SpeedUnitName>,
+    acceleration: Option<AccelerationUnitName>,
+) -> StatedUnits {
+    StatedUnits {
+        speed: speed.is_some(),
+        acceleration: acceleration.is_some(),
     }
 }
 

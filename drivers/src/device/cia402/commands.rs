@@ -3,7 +3,7 @@
 use units::{Coordinate, Time};
 use wire::cia402::{OperationMode, PowerState, Statusword};
 
-use super::homing::HomingPlace;
+use super::homing_place::HomingPlace;
 use super::{Activity, Cia402Drive};
 use crate::device::{
     Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, DriveReference, ReferenceLost,
@@ -54,8 +54,9 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
         self.state()
     }
 
+    /// A drive that nothing is heard of may have lost its power, and its home with that.
     fn is_homed(&self) -> bool {
-        self.homed
+        self.homed && self.node.is_in_service()
     }
 
     fn watches_master(&self) -> bool {

@@ -4,12 +4,13 @@
 //! units by CiA 303-2. Speeds are written in position units per second, so a drive that counts
 //! otherwise is refused: its speeds and ramps would be wrong by a factor.
 //!
-//! A drive that states nothing counts as one in position units; the envelope of its first motion
-//! shows otherwise. Absent: conversions.
+//! A drive that states nothing counts as one in position units until its first motion, which is
+//! measured (`trial`). Absent: conversions.
 
 use wire::canopen::{NodeId, Object};
 use wire::cia402::UnitCode;
 
+use super::settings::StatedUnits;
 use crate::device::DeviceError;
 use crate::protocol::script::{Script, Step};
 
@@ -50,6 +51,37 @@ pub(super) fn description() -> impl Iterator<Item = Step> {
     let factors = factors.flat_map(|(index, _)| [Object::new(index, 1), Object::new(index, 2)]);
     let objects = named.into_iter().chain(factors);
     objects.map(|object| Step::read(object, READING).informative())
+}
+
+/// Which units the drive states.
+pub(super) fn stated(script: &Script) -> StatedUnits {
+    let is_stated = |object| script.value(object).is_some_and(|raw| raw != 0);
+    let has_factor = |wanted| {
+        let mut factors = FACTORS.into_iter();
+        factors.any(|(index, what)| what == wanted && is_stated(Object::new(index, 1)))
+    };
+    let speeds = is_stated(SI_VELOCITY) || is_stated(VELOCITY_DIMENSION);
+    StatedUnits {
+        speed: speeds || has_factor("speed"),
+        acceleration: is_stated(SI_ACCELERATION) || has_factor("acceleration"),
+    }
+}
+
+/// The unit that a drive counts in when it is `factor` times as fast as asked; `per_turn` are the
+/// increments of a turn.
+pub(super) fn fitting_unit(factor: f64, per_turn: Option<f64>) -> &'static str {
+    let per_turn = per_turn.filter(|counts| *counts > 1.0);
+    let turns = per_turn.map_or(f64::NAN, |counts| counts);
+    let units = [
+        (0.1, "a tenth of a count"),
+        (10.0, "ten counts"),
+        (1000.0, "counts and milliseconds"),
+        (turns / 60.0, "turns and minutes"),
+        (turns, "turns"),
+    ];
+    let fits = |unit: f64| (factor / unit - 1.0).abs() < 0.2;
+    let unit = units.into_iter().find(|(unit, _)| fits(*unit));
+    unit.map_or("a unit that is not known here", |(_, name)| name)
 }
 
 /// Whether speeds and accelerations in position units are what the drive takes.
@@ -120,7 +152,11 @@ mod tests {
     #[test]
     fn position_units_per_second_are_taken() {
         assert_eq!(checked(&[]), Ok(()), "nothing is stated");
-        let micrometres = [(0x60A8, 0, 0xFA01_0000), (0x60A9, 0, 0xFA01_0300)];
+        let micrometres = [
+            (0x60A8, 0, 0xFA01_0000),
+            (0x60A9, 0, 0xFA01_0300),
+            (0x60AA, 0, 0xFA01_5700),
+        ];
         assert_eq!(checked(&micrometres), Ok(()));
         assert_eq!(checked(&[(0x60A9, 0, 0x00B5_0300)]), Ok(()));
         let ones = [(0x6096, 1, 1), (0x6096, 2, 1), (0x608C, 0, 0xAC)];

@@ -2,7 +2,7 @@
 
 use units::{Coordinate, Time};
 
-use super::{Activity, Cia402Drive, latch, start};
+use super::{Activity, Cia402Drive, drive_units, latch, start};
 use crate::device::canopen_node::NodeEvent;
 use crate::device::{Alarm, DeviceError};
 use crate::protocol::script::Script;
@@ -59,6 +59,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     fn take_description(&mut self, now: Time, script: &Script) {
         self.probe.counts_edges = latch::counts_edges(&self.settings, script);
         self.supported_modes = start::supported_modes(script);
+        let read = drive_units::stated(script);
+        self.units_proven = self.settings.stated_units.are_all_with(read);
+        self.per_turn = start::increments_per_turn(script);
         let steps = start::check_description(&self.settings, script)
             .and_then(|()| start::configuration(&self.settings, self.probe.counts_edges));
         match steps {

@@ -2,14 +2,16 @@
 //! mask, mode 1 again.
 
 use core::time::Duration;
-use units::{Approach, Coordinate, Counts, Time};
+use units::{Coordinate, Counts, Time};
 use wire::cia402::{Controlword, HomingStatus, OperationMode, Statusword};
 
 use super::convert::{counts_i32, position_counts};
+use super::homing_place::HomingPlace;
 use super::modulo::apart;
 use super::reference::before_home;
 use super::settings::HomeOffset;
-use super::start::{HOME_OFFSET, MODE, homing_steps};
+use super::start::{HOME_OFFSET, MODE, Search, homing_steps};
+use super::trial::Trial;
 use super::{Activity, Cia402Drive};
 use crate::device::envelope::{Profile, TRAVEL_MARGIN};
 use crate::device::{DeviceError, Seen};
@@ -34,6 +36,8 @@ enum Phase {
         /// Since when the axis stands and the drive calls homing done.
         done_since: Option<Time>,
     },
+    /// The trial of its speed is over: once the axis stands, the search begins anew.
+    Slowing,
     /// SDO: mode 1; then the outcome is told.
     Restoring(Result<(), DeviceError>),
     AwaitingProfile(Result<(), DeviceError>),
@@ -50,6 +54,8 @@ pub(super) struct Homing {
     beside: (i64, i64),
     /// The search, in counts per second and per second squared; `None`: homed where it stands.
     search: Option<Profile>,
+    /// Its speed is tried first: the drive states no units.
+    trial: Option<Trial>,
     since: Time,
     deadline: Time,
 }
@@ -58,77 +64,66 @@ impl Homing {
     pub(super) const fn deadline(&self) -> Time {
         self.deadline
     }
-}
 
-/// Where the home is, and how fast it is looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum HomingPlace<S> {
-    /// Where the axis stands.
-    Here,
-    /// Where it leaves its negative limit switch.
-    NegativeLimit(S),
-    /// At the first index pulse off that switch.
-    Index(S),
-    /// At the next index pulse in this direction.
-    NextIndex(S, Approach),
-}
-
-impl<S: Copy> HomingPlace<S> {
-    /// 0x6098. The negative end of the axis is the drive's positive one when the drive counts
-    /// against the axis.
-    pub(super) const fn method(&self, reversed: bool) -> i8 {
-        use Approach::{Forward, Reverse};
-        match (self, reversed) {
-            (Self::Here, _) => 37,
-            (Self::NegativeLimit(_), false) => 17,
-            (Self::NegativeLimit(_), true) => 18,
-            (Self::Index(_), false) => 1,
-            (Self::Index(_), true) => 2,
-            (Self::NextIndex(_, Reverse), false) | (Self::NextIndex(_, Forward), true) => 33,
-            (Self::NextIndex(_, Forward), false) | (Self::NextIndex(_, Reverse), true) => 34,
-        }
-    }
-
-    /// Which way the axis goes when its home is found: off the negative switch, or as asked.
-    const fn ends_forward(&self) -> bool {
-        !matches!(self, Self::NextIndex(_, Approach::Reverse))
-    }
-
-    const fn speed(&self) -> Option<S> {
-        match self {
-            Self::Here => None,
-            Self::NegativeLimit(speed) | Self::Index(speed) | Self::NextIndex(speed, _) => {
-                Some(*speed)
-            }
+    /// The trial of its speed, while that is searched at.
+    pub(super) fn running_trial(&mut self) -> Option<&mut Trial> {
+        match self.phase {
+            Phase::Running { .. } => self.trial.as_mut(),
+            Phase::Preparing
+            | Phase::AwaitingHoming
+            | Phase::Slowing
+            | Phase::Restoring(_)
+            | Phase::AwaitingProfile(_)
+            | Phase::AwaitingPosition => None,
         }
     }
 }
 
 impl<Q: Coordinate> Cia402Drive<Q> {
     pub(super) fn begin_homing(&mut self, now: Time, position: Q, place: HomingPlace<Q::Speed>) {
-        let search = place.speed();
-        if search.is_none() && !self.image.plausible.stands() {
+        if place.speed().is_none() && !self.image.plausible.stands() {
             self.refuse("homing here", "an axis that stands still");
             return;
         }
+        self.homing_asked = Some((position, place));
+        self.prepare_homing(now, position, place, None);
+    }
+
+    /// Writes what the search needs; `trial` goes on where one was too slow.
+    pub(super) fn prepare_homing(
+        &mut self,
+        now: Time,
+        position: Q,
+        place: HomingPlace<Q::Speed>,
+        trial: Option<Trial>,
+    ) {
         let method = place.method(self.settings.scale.resolution() < Q::ZERO);
         let plan = self.home_counts(position).and_then(|(counts, shown)| {
             let offset = match self.settings.home_offset {
                 HomeOffset::IsPositionAtHome => shown,
                 HomeOffset::IsZeroFromHome => -shown,
             };
-            let mut steps = homing_steps(&self.settings, method, offset, search)?;
+            let speed = place.speed();
+            let search = speed.map(|speed| Search::new(&self.settings, method, speed));
+            let search = search.transpose()?;
+            let trial = search.and_then(|search| self.trial_of(search.speed, trial));
+            let search = match trial.map(|trial| trial.values()) {
+                Some((speed, acceleration)) => Some(Search {
+                    speed,
+                    zero_speed: speed,
+                    acceleration,
+                }),
+                None => search,
+            };
+            let mut steps = homing_steps(&self.settings, method, offset, search);
             let first = before_home(&self.settings).filter(|_| search.is_none());
             steps.splice(0..0, first);
-            Ok((
-                counts,
-                search.map(|speed| self.search_profile(speed)),
-                steps,
-            ))
+            let search = search.map(|search| Profile::written(search.speed, search.acceleration));
+            Ok((counts, search, trial, steps))
         });
         match plan {
             Err(error) => self.finish(Err(error)),
-            Ok((position, search, steps)) => {
+            Ok((position, search, trial, steps)) => {
                 self.reached = None;
                 self.homed = false;
                 self.before_home = None;
@@ -138,6 +133,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                     position,
                     beside: self.beside_home(search, place.ends_forward()),
                     search,
+                    trial,
                     since: now,
                     deadline: Time::NEVER,
                 });
@@ -187,6 +183,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             }
             Phase::AwaitingHoming
             | Phase::Running { .. }
+            | Phase::Slowing
             | Phase::AwaitingProfile(_)
             | Phase::AwaitingPosition => {}
         }
@@ -201,7 +198,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             Phase::Restoring(_) | Phase::AwaitingProfile(_) | Phase::AwaitingPosition => {
                 self.finish(Err(error));
             }
-            Phase::Preparing | Phase::AwaitingHoming | Phase::Running { .. } => {
+            Phase::Preparing | Phase::AwaitingHoming | Phase::Running { .. } | Phase::Slowing => {
                 self.restore(now, Err(error));
             }
         }
@@ -222,7 +219,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         self.finish(Err(error));
     }
 
-    fn restore(&mut self, now: Time, result: Result<(), DeviceError>) {
+    pub(super) fn restore(&mut self, now: Time, result: Result<(), DeviceError>) {
         if result.is_err()
             && let Some(here) = self.image.here()
         {
@@ -256,7 +253,18 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                     self.start_homing(now);
                 }
             }
-            Phase::Running { .. } => self.follow_homing(now, sample.status),
+            Phase::Running { .. } => {
+                self.follow_homing(now, sample.status);
+                self.follow_trial(now, sample.status);
+            }
+            Phase::Slowing => {
+                // A sample from before the halt says nothing yet.
+                let fresh = now.since(homing.since) >= self.settings.common.sync_period * 2;
+                if fresh && self.image.plausible.stands() {
+                    let trial = homing.trial;
+                    self.search_anew(now, trial);
+                }
+            }
             Phase::AwaitingProfile(result) => {
                 if sample.mode == OperationMode::ProfilePosition {
                     match result.clone() {
@@ -281,23 +289,40 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
+    /// The search is interrupted: without the start bit, and held by HALT.
+    pub(super) fn interrupt_homing(&mut self, now: Time) {
+        self.hold_back(now);
+        self.repeat_at = Time::NEVER;
+        let patience = Some(self.settings.timeouts.standing);
+        self.enter_homing(now, Phase::Slowing, patience);
+    }
+
     fn start_homing(&mut self, now: Time) {
         let Some(here) = self.image.here() else {
             return;
         };
         let was_far = !self.is_home(here.position);
-        let Activity::Homing(homing) = &self.activity else {
+        let reach = self.search_reach();
+        let Activity::Homing(homing) = &mut self.activity else {
             return;
         };
         let still = Profile {
             speed: 0.0,
             acceleration: 1.0,
         };
+        let mut profile = homing.search.unwrap_or(still);
+        // Beyond the end of its way an axis slows down.
+        let way = self
+            .envelope
+            .stopping_way(profile.speed, profile.acceleration) as i64;
         let reach = match homing.search {
-            Some(_) => self.search_reach(),
+            Some(_) => reach.saturating_add(way),
             None => self.settings.figures().lag,
         };
-        let profile = homing.search.unwrap_or(still);
+        if let Some(trial) = &mut homing.trial {
+            trial.begin(here);
+            profile = trial.profile();
+        }
         self.envelope.begin_homing(here, reach, profile);
         let phase = Phase::Running {
             samples: 0,
@@ -373,22 +398,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
         }
     }
 
-    fn search_profile(&self, speed: Q::Speed) -> Profile {
-        let settings = &self.settings;
-        Profile::new(settings.scale, speed, settings.homing_acceleration)
-    }
-
     /// How far a search may go from where it begins.
     fn search_reach(&self) -> i64 {
-        let settings = &self.settings;
-        let limits = settings.soft_limits;
-        let travel = limits.map(|(low, high)| settings.scale.to_counts(high - low).0.abs());
-        let turn = settings.turn.map(|turn| i64::from(turn.counts));
-        match (turn, travel) {
-            (Some(turn), _) => (turn as f64 * TURN_MARGIN) as i64 + settings.figures().lag,
-            (None, Some(travel)) => (travel as f64 * TRAVEL_MARGIN) as i64,
-            (None, None) => i64::MAX / 4,
-        }
+        let travel = self.settings.travel_counts();
+        let margin = match self.settings.turn {
+            Some(_) => TURN_MARGIN,
+            None => TRAVEL_MARGIN,
+        };
+        let reach = (travel * margin).min((i64::MAX / 4) as f64);
+        reach as i64 + self.settings.figures().lag
     }
 
     /// How far from home the axis may stand after a homing: it stops behind the place where its home
@@ -436,6 +454,15 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             .map_or(Seen::Nothing, |mode| Seen::Mode(mode.raw()));
         match homing.phase.clone() {
             Phase::Preparing | Phase::Restoring(_) => {}
+            Phase::Slowing => {
+                let error = DeviceError::Timeout {
+                    device: self.node.name(),
+                    awaited: "the axis to stand still after the trial of its speed",
+                    waited: now.since(since),
+                    seen: self.seen_status(),
+                };
+                self.restore(now, Err(error));
+            }
             Phase::AwaitingHoming => {
                 let error = DeviceError::Timeout {
                     device: self.node.name(),

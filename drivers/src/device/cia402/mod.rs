@@ -16,6 +16,7 @@
 //!
 //! Absent: cyclic synchronous velocity and torque, interpolated position, the second touch probe.
 
+mod cautious;
 mod commands;
 mod convert;
 mod course;
@@ -24,6 +25,7 @@ mod drive_units;
 mod events;
 mod halt;
 mod homing;
+mod homing_place;
 mod image;
 mod latch;
 mod modulo;
@@ -33,6 +35,7 @@ mod reference;
 mod settings;
 mod start;
 mod supervision;
+mod trial;
 mod watch;
 
 #[cfg(test)]
@@ -54,7 +57,7 @@ use wire::cia402::{Controlword, NamedStatus, OperationMode, PowerState, Statuswo
 pub use cyclic::{interpolation_period, period_from};
 pub use settings::{
     Cia402Settings, Cia402Timeouts, Edge, HomeOffset, LatchSettings, OptionCodes, PositionRange,
-    Turn,
+    StatedUnits, Turn,
 };
 
 use super::canopen_node::CanopenNode;
@@ -64,6 +67,7 @@ use super::{Alarm, Axis, Device, DeviceError, DriveReference, Identity, RotaryAx
 use cyclic::ModeChange;
 use halt::Halt;
 use homing::Homing;
+use homing_place::HomingPlace;
 use image::{Image, Sample};
 use latch::{LatchChange, Probe};
 use motion::Move;
@@ -156,6 +160,12 @@ pub struct Cia402Drive<Q: Coordinate = Metres> {
     supported_modes: Option<u32>,
     /// Velocity and acceleration that the drive confirmed.
     profile: Option<(u32, u32)>,
+    /// Its units of speed and acceleration are stated, or its first motion agreed with them.
+    units_proven: bool,
+    /// Encoder increments of a turn.
+    per_turn: Option<f64>,
+    /// The homing to begin once the trial of its speed is over.
+    homing_asked: Option<(Q, HomingPlace<Q::Speed>)>,
     /// The target that the axis reached last and was not moved from since.
     reached: Option<i64>,
     /// The drive was given a target that the axis has not reached, and that nothing has voided.
@@ -233,6 +243,9 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             commanded_mode: None,
             supported_modes: None,
             profile: None,
+            units_proven: false,
+            per_turn: None,
+            homing_asked: None,
             reached: None,
             open_target: false,
             envelope: Envelope::new(settings.figures()),

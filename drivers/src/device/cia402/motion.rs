@@ -15,6 +15,7 @@ use wire::cia402::{Controlword, OperationMode, Statusword};
 
 use super::convert::{acceleration_counts, out_of_range, position_counts, velocity_counts};
 use super::start::{MODE, PROFILE_ACCELERATION, PROFILE_VELOCITY, TARGET_POSITION, profile_steps};
+use super::trial::Trial;
 use super::{Activity, Cia402Drive};
 use crate::device::envelope::Profile;
 use crate::device::{DeviceError, Seen};
@@ -40,12 +41,14 @@ enum MovePhase {
 /// A move under way, or one that only has to be started.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Move {
-    target: i64,
+    pub(super) target: i64,
     /// Where the drive is sent now: the target, or a point on a long way round to it.
-    set_point: i64,
+    pub(super) set_point: i64,
     /// Ends where only the edge of the set-point bit is missing.
     only_prepared: bool,
-    profile: (u32, u32),
+    pub(super) profile: (u32, u32),
+    /// The first part of the way is a trial of the drive's units, after which this is the profile.
+    pub(super) trial: Option<(Trial, (u32, u32))>,
     phase: MovePhase,
     since: Time,
     deadline: Time,
@@ -100,7 +103,10 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.finish(Ok(()));
                 self.prepared = only_prepared.then_some(planned);
             }
-            Ok(planned) => {
+            Ok(mut planned) => {
+                if !only_prepared {
+                    self.begin_cautiously(&mut planned);
+                }
                 let mut steps = Vec::new();
                 if self.profile != Some(planned.profile) {
                     let (velocity, acceleration) = planned.profile;
@@ -168,6 +174,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
             set_point: self.way_point(counts),
             only_prepared,
             profile,
+            trial: None,
             phase: MovePhase::Preparing,
             since: now,
             // SDO has time-outs of its own.
@@ -178,7 +185,7 @@ impl<Q: Coordinate> Cia402Drive<Q> {
 
     /// Where to send the drive now for it to come to `target` in the end. One that wraps takes
     /// the shortest way, so it must never have half a turn to go.
-    fn way_point(&self, target: i64) -> i64 {
+    pub(super) fn way_point(&self, target: i64) -> i64 {
         let (Some(turn), Some(sample)) = (self.settings.wraps_at(), self.image.sample()) else {
             return target;
         };
@@ -283,11 +290,26 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                     self.set_off(now, set_point);
                 }
             }
+            MovePhase::Running if moving.trial.is_some() => {
+                self.follow_tried_move(now);
+                self.watch_arrival(target, acknowledged);
+            }
             MovePhase::Running if self.nears_way_point(target, set_point) => {
                 self.go_on(now, target);
             }
             MovePhase::Running => self.watch_arrival(target, acknowledged),
         }
+    }
+
+    /// Goes on with another profile, on the fly.
+    pub(super) fn go_on_as(&mut self, now: Time, mut planned: Move) {
+        let (velocity, acceleration) = planned.profile;
+        self.profile = None;
+        (planned.phase, planned.since) = (MovePhase::Preparing, now);
+        planned.deadline = Time::NEVER;
+        self.activity = Activity::Move(planned);
+        self.node.run(now, profile_steps(velocity, acceleration));
+        self.pump(now);
     }
 
     /// The next set-point on a long way, on the fly.
@@ -354,20 +376,17 @@ impl<Q: Coordinate> Cia402Drive<Q> {
     }
 
     fn raise_set_point(&mut self, now: Time) {
-        let Activity::Move(moving) = &self.activity else {
+        let Activity::Move(moving) = &mut self.activity else {
             return;
         };
         let (target, profile) = (moving.target, moving.profile);
         if let Some(here) = self.image.here() {
-            let (speed, acceleration) = (f64::from(profile.0), f64::from(profile.1));
-            self.envelope.begin_motion(
-                here,
-                target,
-                Profile {
-                    speed,
-                    acceleration,
-                },
-            );
+            let mut profile = Profile::written(profile.0, profile.1);
+            if let Some((trial, _)) = &mut moving.trial {
+                trial.begin(here);
+                profile = trial.profile();
+            }
+            self.envelope.begin_motion(here, target, profile);
         }
         self.open_target = true;
         let patience = self.settings.timeouts.set_point;

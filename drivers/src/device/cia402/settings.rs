@@ -59,6 +59,8 @@ pub struct Cia402Settings<Q: Coordinate = Metres> {
     pub home_offset: HomeOffset,
     /// How the drive proves that it has kept its reference; `None`: it cannot.
     pub reference_proof: Option<ReferenceProof>,
+    /// What its owner states of its units.
+    pub stated_units: StatedUnits,
     /// Whether TPDO 2 carries the following error (0x60F4).
     pub map_following_error: bool,
     /// Whether RPDO 1 takes effect at the next SYNC (transmission type 1) instead of at once, so
@@ -84,6 +86,23 @@ pub struct OptionCodes {
     pub fault_reaction: Option<i16>,
     /// 0x6007: when our heartbeat is lost; 3 is a quick stop.
     pub abort_connection: Option<i16>,
+}
+
+/// What is stated to count in position units and seconds. Where both are, the first motion is not
+/// measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StatedUnits {
+    /// Speed.
+    pub speed: bool,
+    /// Acceleration.
+    pub acceleration: bool,
+}
+
+impl StatedUnits {
+    /// Whether nothing is left open with what `other` states.
+    pub(super) const fn are_all_with(self, other: Self) -> bool {
+        (self.speed || other.speed) && (self.acceleration || other.acceleration)
+    }
 }
 
 /// CiA 402 says that zero is the home position plus the offset; many drives take the offset
@@ -268,6 +287,7 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             homing_acceleration: acceleration_max * 0.1,
             home_offset: HomeOffset::IsPositionAtHome,
             reference_proof: None,
+            stated_units: StatedUnits::default(),
             map_following_error: true,
             synchronous_start: false,
             timeouts: Cia402Timeouts::default(),
@@ -280,6 +300,14 @@ impl<Q: Coordinate> Cia402Settings<Q> {
             .following_error
             .map_or(self.jump_margin, |error| error.0);
         self.scale.to_counts(lag).0.saturating_abs()
+    }
+
+    /// From one end of the axis to the other, or one turn; endless where neither is known.
+    pub(super) fn travel_counts(&self) -> f64 {
+        let limits = self.soft_limits;
+        let travel = limits.map(|(low, high)| self.scale.to_counts(high - low).0.abs() as f64);
+        let turn = self.turn.map(|turn| f64::from(turn.counts));
+        turn.or(travel).unwrap_or(f64::INFINITY)
     }
 
     /// What its motion is judged by.

@@ -62,6 +62,15 @@ pub(super) fn supported_modes(script: &Script) -> Option<u32> {
     script.value(SUPPORTED_MODES)
 }
 
+/// Encoder increments of a turn (0x608F), where the drive says so.
+pub(super) fn increments_per_turn(script: &Script) -> Option<f64> {
+    let (increments, turns) = (
+        script.value(ENCODER_INCREMENTS)?,
+        script.value(ENCODER_REVOLUTIONS)?,
+    );
+    (turns != 0).then(|| f64::from(increments) / f64::from(turns))
+}
+
 /// Whether the drive can do what is asked of it, in the units of the configuration.
 pub(super) fn check_description<Q: Coordinate>(
     settings: &Cia402Settings<Q>,
@@ -284,13 +293,44 @@ fn unmark<Q: Coordinate>(settings: &Cia402Settings<Q>) -> Option<Step> {
     Some(Step::check(object, 0_u32, text))
 }
 
+/// How fast a home is searched, in counts per second and per second squared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Search {
+    pub(super) speed: u32,
+    /// Of the search for the zero behind a switch.
+    pub(super) zero_speed: u32,
+    pub(super) acceleration: u32,
+}
+
+impl Search {
+    pub(super) fn new<Q: Coordinate>(
+        settings: &Cia402Settings<Q>,
+        method: i8,
+        speed: Q::Speed,
+    ) -> Result<Self, DeviceError> {
+        let speed = velocity_counts(settings, HOMING_SPEED_SEARCH, speed)?;
+        let acceleration = settings.homing_acceleration;
+        let acceleration = acceleration_counts(settings, HOMING_ACCELERATION, acceleration)?;
+        // The search of a switch is followed by a slow one; that of an index pulse is the only one.
+        let zero_speed = match method {
+            33 | 34 => speed,
+            _ => (speed / 5).max(1),
+        };
+        Ok(Self {
+            speed,
+            zero_speed,
+            acceleration,
+        })
+    }
+}
+
 /// Homing parameters, then the mode.
 pub(super) fn homing_steps<Q: Coordinate>(
     settings: &Cia402Settings<Q>,
     method: i8,
     offset: i32,
-    speed: Option<Q::Speed>,
-) -> Result<Vec<Step>, DeviceError> {
+    search: Option<Search>,
+) -> Vec<Step> {
     const TEXT: &str = "setting the homing parameters";
     // First of all: a homing that ends half-way must leave no mark of the zero before.
     let mut steps: Vec<Step> = unmark(settings).into_iter().collect();
@@ -298,23 +338,15 @@ pub(super) fn homing_steps<Q: Coordinate>(
         Step::check(HOME_OFFSET, offset, TEXT),
         Step::check(HOMING_METHOD, method, TEXT),
     ]);
-    if let Some(speed) = speed {
-        let search = velocity_counts(settings, HOMING_SPEED_SEARCH, speed)?;
-        let acceleration =
-            acceleration_counts(settings, HOMING_ACCELERATION, settings.homing_acceleration)?;
-        steps.push(Step::check(HOMING_SPEED_SEARCH, search, TEXT));
-        // The search of a switch is followed by a slow one; that of an index pulse is the only one.
-        let zero = match method {
-            33 | 34 => search,
-            _ => (search / 5).max(1),
-        };
-        steps.push(Step::check(HOMING_SPEED_ZERO, zero, TEXT));
-        steps.push(Step::check(HOMING_ACCELERATION, acceleration, TEXT));
+    if let Some(search) = search {
+        steps.push(Step::check(HOMING_SPEED_SEARCH, search.speed, TEXT));
+        steps.push(Step::check(HOMING_SPEED_ZERO, search.zero_speed, TEXT));
+        steps.push(Step::check(HOMING_ACCELERATION, search.acceleration, TEXT));
     }
     steps.push(Step::write(
         MODE,
         OperationMode::Homing.raw(),
         "choosing the homing mode",
     ));
-    Ok(steps)
+    steps
 }

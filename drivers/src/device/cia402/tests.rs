@@ -5,7 +5,7 @@ use units::{Metres, MetresPerSecond, MetresPerSecondSquared, Scale, Time};
 use wire::canopen::sdo::AbortCode;
 use wire::canopen::{NodeId, Object};
 
-use super::homing::HomingPlace;
+use super::homing_place::HomingPlace;
 use super::*;
 use crate::device::canopen_node::{ExpectedIdentity, NodeSettings};
 use crate::device::fake_node::FakeNode;
@@ -80,6 +80,8 @@ impl FakeDrive {
             node.set(index, sub, &vec![0; len]);
         }
         node.set_u32(0x6502, 0, 0x21);
+        node.set_u32(0x60A9, 0, 0x00B5_0300);
+        node.set_u32(0x60AA, 0, 0x00B5_5700);
         Self {
             node,
             state: 0x40,

@@ -20,6 +20,7 @@ const HOMING_METHODS_WITH_INDEX: &[i64] = &[0, 1, 2, 17, 18, 33, 34, 35, 37];
 const UNIT_INCREMENTS: i64 = 0x00B5_0000;
 /// "per second" in an SI unit.
 const PER_SECOND: i64 = 0x0000_0300;
+const PER_SECOND_SQUARED: i64 = 0x0000_5700;
 /// Bytes of 0x2000, enough for a block upload of several blocks of ordinary clients.
 const LOG_BYTES: usize = 889;
 /// The most bytes 0x2001 takes.
@@ -184,8 +185,16 @@ fn insert_factors(dictionary: &mut Dictionary, config: &Cia402DriveConfig) {
         None => units(config.encoder_resolution_nm),
     };
     dictionary.insert(0x60A8, 0, Entry::read_write(U32, position));
-    if config.quirks.speed_unit.is_none() {
+    let quirks = &config.quirks;
+    if quirks.speed_unit.is_none() {
         dictionary.insert(0x60A9, 0, Entry::read_write(U32, velocity));
+    }
+    if quirks.acceleration_unit.is_none() {
+        dictionary.insert(
+            0x60AA,
+            0,
+            Entry::read_write(U32, position | PER_SECOND_SQUARED),
+        );
     }
     insert_unit_objects(dictionary, &config.quirks.unit_objects);
 }

@@ -86,7 +86,7 @@ pub enum RpdoDeadline {
 }
 
 /// Objects that name the units of speed and acceleration; each is absent unless it has a value.
-/// 0x60A9 is there, in position units per second, while `speed_unit` is not given.
+/// 0x60A9 and 0x60AA are there, in position units, while `speed_unit` and `acceleration_unit` are not given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UnitObjects {

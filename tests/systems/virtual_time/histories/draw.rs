@@ -34,12 +34,12 @@ impl Dice {
         Duration::from_millis(self.between(low, high) as u64)
     }
 
-    fn axis(&mut self, kind: &Kind) -> usize {
+    pub(super) fn axis(&mut self, kind: &Kind) -> usize {
         let axes: Vec<usize> = (0..kind.axes.len()).collect();
         self.one_of(&axes)
     }
 
-    fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
+    pub(super) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         let at = (self.share() * choices.len() as f64) as usize;
         choices[at.min(choices.len() - 1)]
     }
@@ -210,6 +210,37 @@ pub(super) fn draw_quirks(dice: &mut Dice, emulated: &mut EmulatedConfig) -> Vec
         if dice.falls(2.5 / QUIRKS.len() as f64) {
             (quirk.set)(dice, drive);
             drawn.push(quirk.name.to_owned());
+        }
+    }
+    drawn
+}
+
+/// Quirks that no alarm may come of.
+const MANNERS: &[&str] = &[
+    "stale_homing_ms",
+    "edge_before_target",
+    "edge_in_mapping_order",
+    "halt_blocks_mode",
+    "identical_target_ignored",
+    "statusword_bits",
+    "sdo_response_delay_us",
+    "sdo_size_bit_omitted",
+    "sdo_always_four_bytes",
+    "upper_soft_limit_first",
+];
+
+/// Gives each drive of a sound machine manners that a driver has to bear; returns which.
+pub(super) fn draw_manners(dice: &mut Dice, emulated: &mut EmulatedConfig) -> Vec<&'static str> {
+    let mut drawn = vec![];
+    for node in &mut emulated.nodes {
+        let DeviceConfig::Cia402Drive(drive) = &mut node.device else {
+            continue;
+        };
+        for quirk in QUIRKS.iter().filter(|quirk| MANNERS.contains(&quirk.name)) {
+            if dice.falls(0.1) {
+                (quirk.set)(dice, drive);
+                drawn.push(quirk.name);
+            }
         }
     }
     drawn

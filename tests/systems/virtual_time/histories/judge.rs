@@ -25,6 +25,10 @@ pub(super) struct AxisFacts {
     pub(super) acceleration: f64,
     /// What slows it down without torque.
     pub(super) friction: f64,
+    /// Seconds from the answer to a request until its controlword takes effect.
+    pub(super) reaction: f64,
+    /// How fast its deceleration builds up in a controlled stop.
+    pub(super) jerk: f64,
     /// Of its reference search, the fastest part.
     pub(super) search_speed: f64,
     /// Slower than this it stands.
@@ -170,7 +174,16 @@ impl Judge {
     pub(super) fn allow_slowing(&mut self, simulation: &mut Simulation, asked: String) {
         let (here, speed) = self.state(simulation);
         let now = simulation.now();
-        self.allow(simulation, (here, here), speed, asked);
+        // Until the drive has the controlword its axis goes on and may still speed up; with a jerk, until
+        // its acceleration has turned into a deceleration.
+        let (jerk, reaction) = (self.facts.jerk, self.facts.reaction);
+        let acceleration = self.deceleration(simulation);
+        let most = self.allowed.speed.max(speed);
+        let heard = (speed + acceleration * reaction).min(most);
+        let fastest = (heard + acceleration * acceleration / (2.0 * jerk)).min(most);
+        let turning = 2.0 * (fastest - heard) / acceleration + acceleration / (2.0 * jerk);
+        let way = fastest * (reaction + turning);
+        self.allow(simulation, (here - way, here + way), fastest, asked);
         self.allowed.speed = self.allowed.speed.max(self.facts.standing_speed);
         self.allowed.stands_by = Some(now + STANDS_AFTER);
     }
@@ -239,12 +252,18 @@ impl Judge {
     }
 
     fn stopping_way(&self, simulation: &mut Simulation, speed: f64) -> f64 {
-        let driven = drive(simulation, &self.facts).power_state() == PowerState::OperationEnabled;
-        let deceleration = match driven && !self.may_coast {
-            true => self.facts.acceleration,
-            false => self.facts.friction,
-        };
-        speed * speed / (2.0 * deceleration)
+        speed * speed / (2.0 * self.deceleration(simulation))
+    }
+
+    /// What slows the axis down: its drive, in the unit that it has, or friction.
+    fn deceleration(&self, simulation: &mut Simulation) -> f64 {
+        let drive = drive(simulation, &self.facts);
+        let driven = drive.power_state() == PowerState::OperationEnabled;
+        if driven && !self.may_coast {
+            self.facts.acceleration * drive.quirks_mut().acceleration_unit.unwrap_or(1.0)
+        } else {
+            self.facts.friction
+        }
     }
 
     /// Looks at the axis and at its view.

@@ -24,11 +24,13 @@ pub(super) struct Kind {
     pub(super) turns: bool,
     /// Its axes follow paths together.
     pub(super) follows_paths: bool,
-    edit: fn(String) -> String,
+    pub(super) edit: fn(String) -> String,
 }
 
 const MM: f64 = 1e-3;
 const DEG: f64 = core::f64::consts::PI / 180.0;
+/// The adapter hands frames over every millisecond, and a drive looks at them as often.
+const AT_ONCE: f64 = 0.002;
 
 /// The linear stage; fewer passes and a faster search, so that a zero takes less time.
 pub(super) const LINEAR_STAGE: Kind = Kind {
@@ -41,6 +43,8 @@ pub(super) const LINEAR_STAGE: Kind = Kind {
         following_error: 0.5 * MM,
         acceleration: 5000.0 * MM,
         friction: 2.0,
+        reaction: AT_ONCE,
+        jerk: f64::INFINITY,
         search_speed: 50.0 * MM,
         standing_speed: 0.5 * MM,
         per_unit: MM,
@@ -72,6 +76,8 @@ pub(super) const ROTARY_TABLE: Kind = Kind {
         following_error: 600.0 / 3600.0 * DEG,
         acceleration: 180.0 * DEG,
         friction: 60.0 * DEG,
+        reaction: AT_ONCE,
+        jerk: f64::INFINITY,
         search_speed: 60.0 * DEG,
         standing_speed: 0.5 * DEG,
         per_unit: DEG,
@@ -98,6 +104,9 @@ const fn slide(name: &'static str, node: &'static str, number: usize) -> AxisFac
         following_error: 0.5 * MM,
         acceleration: 1000.0 * MM,
         friction: 1.0,
+        // The machine hears at a SYNC, its drives at the next, and they reach a set-point one later.
+        reaction: 3.0 * 0.010 + AT_ONCE,
+        jerk: 20_000.0 * MM,
         search_speed: 20.0 * MM,
         standing_speed: 0.5 * MM,
         per_unit: MM,
@@ -153,6 +162,16 @@ impl Kind {
         match self.turns {
             true => (way + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0,
             false => way,
+        }
+    }
+
+    /// The other way round to the same place, where it is longer by `slack` at most; else `way` itself.
+    pub(super) fn way_around(&self, way: f64, slack: f64) -> f64 {
+        const TURN: f64 = core::f64::consts::TAU;
+        if self.turns && TURN - 2.0 * way.abs() <= 2.0 * slack {
+            way - TURN.copysign(way)
+        } else {
+            way
         }
     }
 

@@ -23,6 +23,8 @@ const STEP_MAX: Duration = Duration::from_secs(120);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 /// A jog is renewed so often.
 const RENEW_EVERY: Duration = Duration::from_millis(50);
+/// It lapses 200 ms after it was renewed last.
+const JOG_LAPSES: Duration = Duration::from_millis(300);
 
 /// Motions and a run that have not ended.
 #[derive(Clone, Debug)]
@@ -350,7 +352,14 @@ impl Player<'_> {
             desk.plan_run(&anna(), &request, None)
         });
         match id {
-            Some(id) => self.under_way.run = Some(Run { id, attained }),
+            Some(id) => {
+                if !is_free {
+                    // The one before ended meanwhile.
+                    self.see_ends();
+                    self.allow_run(kind, path);
+                }
+                self.under_way.run = Some(Run { id, attained });
+            }
             None if is_free => self.leave_all("a refused run"),
             None => {}
         }
@@ -434,7 +443,14 @@ impl Player<'_> {
         }
         let id = self.order(&what, |desk| desk.begin_motion(&anna(), &request, None));
         match id {
-            Some(id) => self.under_way.motions[step.axis] = Some(id),
+            Some(id) => {
+                if !is_free && !step.supersedes {
+                    // What had the axis ended meanwhile.
+                    self.see_ends();
+                    self.allow_move(step.axis, step.target, speed, what);
+                }
+                self.under_way.motions[step.axis] = Some(id);
+            }
             None if is_free => self.leave(step.axis, "a refused motion"),
             None => self.judge(step.axis, |judge, _| judge.put_back(before)),
         }
@@ -442,14 +458,15 @@ impl Player<'_> {
 
     /// The way to `target`, from where the axis is.
     fn allow_move(&self, axis: usize, target: f64, speed: f64, asked: String) {
-        let kind = self.kind;
+        let (kind, facts) = (self.kind, self.axis(axis));
         let (shown, here) = self.place(axis);
         let way = kind.way(shown, target);
         self.judge(axis, |judge, simulation| {
-            // A superseded motion slows down first.
+            // A superseded motion slows down first, after which the other way round may be the shorter one.
             let now = judge.state(simulation).1.max(speed);
-            let low = here + way.min(0.0) - kind.approach;
-            let high = here + way.max(0.0) + kind.approach;
+            let around = kind.way_around(way, now * now / facts.acceleration);
+            let low = here + way.min(around).min(0.0) - kind.approach;
+            let high = here + way.max(around).max(0.0) + kind.approach;
             judge.allow(simulation, (low, high), now, asked);
         });
     }
@@ -461,14 +478,19 @@ impl Player<'_> {
             speed: self.kind.speed_of(speed),
         };
         if !self.under_way.is_free(axis) {
-            self.order("jog beside another motion", |desk| {
+            let id = self.order("jog beside another motion", |desk| {
                 desk.jog(&anna(), &request)
             });
+            if let Some(id) = id {
+                // What had the axis ended meanwhile.
+                self.see_ends();
+                let way = speed * JOG_LAPSES.as_secs_f64();
+                self.allow_jogs(axis, speed, way, "a jog after another motion");
+                self.under_way.motions[axis] = Some(id);
+            }
             return;
         }
-        // It lapses 200 ms after it was renewed last.
-        let lapses = Duration::from_millis(300);
-        let way = speed * (held + RENEW_EVERY + lapses).as_secs_f64();
+        let way = speed * (held + RENEW_EVERY + JOG_LAPSES).as_secs_f64();
         let back = JogRequest {
             axis: name.into(),
             speed: self.kind.speed_of(-speed),
@@ -490,7 +512,7 @@ impl Player<'_> {
                 let is_taken = self.ask(|desk| desk.jog(&Caller::named("bert"), &back));
                 if matches!(is_taken, Some(Ok(_))) {
                     self.allow_jogs(axis, speed, way, &what);
-                    self.pass(lapses * 2);
+                    self.pass(JOG_LAPSES * 2);
                     passed = held;
                 }
             }
