@@ -64,6 +64,6 @@ pub use patience::Patience;
 pub use scan::Found;
 pub use sensing::{start_sensors, stop_sensors};
 pub use stop_request::StopRequest;
-pub use stopping::{STOP_LIMIT, watch_stopped};
+pub use stopping::{LONGEST_STOP, STOP_LIMIT, watch_stopped};
 pub use turning::Turning;
 pub use unit::Unit;

@@ -15,6 +15,15 @@ use crate::release::release_watches;
 
 /// The longest a stop may take before the next drive is tried.
 pub const STOP_LIMIT: Duration = Duration::from_secs(2);
+/// How long an axis that cannot be braked is watched until it stands.
+const COAST_LIMIT: Duration = Duration::from_secs(10);
+/// The longest that the whole of [`Machine::make_safe`] takes, with a second for the search of a cause. A second
+/// request to stop counts for nothing before.
+pub const LONGEST_STOP: Duration = Duration::from_secs(15);
+const _: () = assert!(
+    LONGEST_STOP.as_secs() == 2 * STOP_LIMIT.as_secs() + COAST_LIMIT.as_secs() + 1,
+    "it is the sum of its parts"
+);
 /// How long the slowest module may take to send again after a rest.
 const AWAKE_LIMIT: Duration = Duration::from_secs(1);
 

@@ -188,7 +188,6 @@ fn the_library_alone_links_no_command_line_and_no_emulator() {
     assert!(tree.contains("machine v"), "no tree: {tree}");
     let absent = [
         "clap v",
-        "indicatif v",
         "signal-hook v",
         "mock-bus v",
         "axum v",

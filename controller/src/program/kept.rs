@@ -26,7 +26,7 @@ use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::rotary::readings::is_turned_by_hand;
-use crate::program::session::stop_on_signals;
+use crate::program::signals::stop_on_signals;
 use crate::program::{AskArgs, AxisArgs, MachineArgs, VerifyArgs};
 use crate::runs::Choice;
 use heard::Heard;

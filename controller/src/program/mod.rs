@@ -55,9 +55,11 @@ mod serve;
 mod session;
 mod shell;
 mod show;
+mod signals;
 mod span;
 #[cfg(test)]
 mod stored_tests;
+mod streams;
 mod targets;
 mod text;
 mod token;
@@ -346,6 +348,18 @@ pub fn main(
     version: &'static str,
 ) -> ExitCode {
     made_by::this_is(version);
+    signals::outlive_full_files();
+    let code = run(keep, enrol, version);
+    // What could not be printed was said where it was given.
+    let _ = streams::finish();
+    code
+}
+
+fn run(
+    keep: fn(Serving) -> Result<(), Failure>,
+    enrol: fn(NewToken) -> Result<String, Failure>,
+    version: &'static str,
+) -> ExitCode {
     let words = with_examples(Cli::command())
         .version(version)
         .try_get_matches();
