@@ -12,6 +12,7 @@ mod bus_account;
 mod bus_text;
 mod bus_watch;
 mod cause_search;
+mod coasting;
 mod devices;
 mod diagnosis;
 mod driving;

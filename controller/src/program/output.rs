@@ -119,7 +119,9 @@ impl Output {
     fn print(self, text: &str, value: &Value) -> Result<(), Failure> {
         let line = match self.json {
             true => self.object(value),
-            false if streams::is_out_terminal() && paint::is_wanted() => paint::painted(&plain(text)),
+            false if streams::is_out_terminal() && paint::is_wanted() => {
+                paint::painted(&plain(text))
+            }
             false => plain(text),
         };
         streams::print((line + "\n").into_bytes()).map(drop)

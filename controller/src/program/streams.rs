@@ -86,7 +86,7 @@ pub(super) fn print(bytes: Vec<u8>) -> Result<Reader, Failure> {
 /// # Errors
 /// When something that was printed before could not be written.
 pub(super) fn show(bytes: Vec<u8>) -> Result<Reader, Failure> {
-    if OUT.state.waiting.load(Ordering::Relaxed) == 0 {
+    if OUT.state.waiting.load(Ordering::Relaxed) < SIGNS_WAITING_MAX {
         OUT.give(Given::Text(bytes));
     }
     OUT.reader()
