@@ -16,6 +16,7 @@ fn main() -> ExitCode {
             let made = service::add_token(&new.file, &new.name, new.role, &new.made);
             made.map_err(|it| refused("truestage token", &it))
         },
+        service::failure_code,
         env!("TRUESTAGE_VERSION"),
     )
 }

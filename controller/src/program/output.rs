@@ -1,5 +1,7 @@
 //! stdout for results, stderr for everything else, in the order in which it was said.
 
+use std::sync::OnceLock;
+
 use serde_json::{Map, Value, json};
 
 use crate::Failure;
@@ -184,9 +186,39 @@ impl Output {
             if let Failure::Config(ConfigError::Invalid { findings }) = failure {
                 error["findings"] = json!(findings);
             }
+            describe(failure, &mut error);
             self.print_failed("", &error);
         }
         self.must_say(&format!("error: {failure}"));
+    }
+}
+
+/// The kind of a failure, as a service names it.
+static CODE_OF: OnceLock<fn(&Failure) -> String> = OnceLock::new();
+
+/// Names failures by `code_of` from now on.
+pub(super) fn name_failures_by(code_of: fn(&Failure) -> String) {
+    // A program has one main function.
+    let _ = CODE_OF.set(code_of);
+}
+
+/// Adds to the object of `failure` what a program that reads it acts upon.
+fn describe(failure: &Failure, object: &mut Value) {
+    let source = match failure {
+        Failure::Resumable { source, journal } => {
+            object["journal"] = json!(journal);
+            object["can_resume"] = json!(true);
+            source
+        }
+        other => other,
+    };
+    if let Failure::Machine(failure) = source
+        && let Some(device) = failure.device()
+    {
+        object["device"] = json!(device);
+    }
+    if let Some(code_of) = CODE_OF.get() {
+        object["code"] = json!(code_of(source));
     }
 }
 
