@@ -10,11 +10,9 @@ use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use nix::sys::termios::{FlowArg, tcflow};
 use nix::unistd::pipe;
-use serde_json::json;
-use tests::{Edit, Rig};
+use tests::Rig;
 
-use crate::programs::{Bench, Process, live_rigs, number, program, text};
-use crate::serve::{ask, keep};
+use crate::programs::{Bench, Process, live_rigs, text};
 use crate::signals::Table;
 
 const JOG: [&str; 3] = ["jog", "machine.toml", "c=20deg/s"];
@@ -110,11 +108,11 @@ fn a_reader_that_comes_back_reads_what_was_blocked() {
     let bench = Bench::new(Rig::Pty);
     let (unread, full) = full_pipe();
     let mut command = bench.verb(&["calibrate", "machine.toml"]);
-    let command = command.stdin(Stdio::null()).stdout(Stdio::piped());
+    command.stdin(Stdio::null()).stdout(Stdio::piped());
     let process = Process::spawn(command.stderr(full));
-    // Its end waits for a second.
-    let mut said = String::new();
+    // The pipe ends with whoever has its other end.
     drop(command);
+    let mut said = String::new();
     let ended = std::thread::spawn(move || process.end().code);
     let read = File::from(unread).read_to_string(&mut said);
     assert!(read.is_ok(), "{said}");
@@ -134,12 +132,12 @@ fn a_verb_that_failed_ends_when_its_table_stands() {
         .lend_hand("fault fault = { kind = \"safe_torque_off\" }");
     let turned = table.turns_after(&mut process);
     let coasted = table.angle_deg() - opened;
-    assert!(coasted > 1.0, "it coasted by {coasted} degrees only");
+    // In a tenth of that time its drive had said that it is off.
+    assert!(coasted > 2.0, "it coasted by {coasted} degrees only");
     assert!(turned < 0.01, "it turned by {turned} of {coasted} degrees");
     let ended = process.end();
     assert_eq!(ended.code, Some(4), "{ended:?}");
     assert_eq!(ended.json["device"], "c", "{ended:?}");
-    assert!(ended.said.contains("coasts on"), "{ended:?}");
 }
 
 /// The journal grows beyond what a file may: that is an error of a file, not the end of the program.

@@ -5,6 +5,7 @@ use std::io::Read as _;
 use std::os::unix::net::UnixStream;
 use std::process::{Command, Stdio};
 
+use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use tests::{ROTARY, Rig};
@@ -112,6 +113,8 @@ fn a_terminal_that_closes_leaves_no_table_turning() {
     let mut table = Table::new();
     let verb = table.bench.verb(&[&JOG[..], &["--yes"]].concat());
     let terminal = openpty(None, None).expect("a terminal can be had");
+    let no_child_has = FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC);
+    fcntl(&terminal.master, no_child_has).expect("it is open");
     let mut command = Command::new("setsid");
     command.current_dir(table.bench.folder()).arg("--ctty");
     command.arg(verb.get_program()).args(verb.get_args());
