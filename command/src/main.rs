@@ -3,6 +3,7 @@
 
 use std::io;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use service::{
     Access, AccessFiles, Edge, Listen, ListenError, Manager, Opened, Service, StartError,
@@ -16,6 +17,7 @@ fn main() -> ExitCode {
             let made = service::add_token(&new.file, &new.name, new.role, &new.made);
             made.map_err(|it| refused("truestage token", &it))
         },
+        service::failure_code,
         env!("TRUESTAGE_VERSION"),
     )
 }
@@ -38,6 +40,7 @@ fn serve(serving: Serving) -> Result<(), Failure> {
         everywhere: network.require_token,
     });
     let access = access.map_err(|it| refused("truestage serve", &it))?;
+    let access = access.saying(Arc::clone(&told));
     let places = places_of(&listen, &access).map_err(|it| refused("--listen", &it))?;
     let manager = Manager::of_environment();
     let say = |text: &str| manager.iter().for_each(|it| it.say(text));

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use units::Time;
+use units::{LengthOrAngle, Time};
 
 use crate::observer::{Observer, Silent};
 
@@ -59,6 +59,19 @@ impl Notices {
         for text in self.held_back.take().unwrap_or_default() {
             self.observer.warning(&text);
         }
+    }
+
+    /// The stop of `axis` ended before it was seen to stand.
+    pub(crate) fn warn_restless(&mut self, axis: &str, speed: Option<LengthOrAngle>) {
+        let seen = match speed {
+            Some(speed) => {
+                format!("is still moving, at {speed:+.1}/s, and its drive has no torque")
+            }
+            None => "said nothing of its place since its drive was switched off".to_owned(),
+        };
+        self.observer.warning(&format!(
+            "axis {axis} {seen}: make sure that it stands still before you reach in"
+        ));
     }
 
     /// The operator must not read "stopped" of an axis that did not say so. `why`: what is known of that.

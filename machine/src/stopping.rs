@@ -7,14 +7,25 @@ use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
 
 use crate::cause_search::{CauseSearch, diagnose};
+use crate::coasting::await_rest;
 use crate::diagnosis::is_wait;
 use crate::failure::{Failure, Layered};
 use crate::kept_zero;
 use crate::machine::{Machine, Supervision};
 use crate::release::release_watches;
+use crate::waiting::Watched;
 
 /// The longest a stop may take before the next drive is tried.
 pub const STOP_LIMIT: Duration = Duration::from_secs(2);
+/// How long an axis that cannot be braked is watched until it stands.
+pub(crate) const COAST_LIMIT: Duration = Duration::from_secs(10);
+/// The longest that the whole of [`Machine::make_safe`] takes, with a second for the search of a cause. A second
+/// request to stop counts for nothing before.
+pub const LONGEST_STOP: Duration = Duration::from_secs(15);
+const _: () = assert!(
+    LONGEST_STOP.as_secs() == 2 * STOP_LIMIT.as_secs() + COAST_LIMIT.as_secs() + 1,
+    "it is the sum of its parts"
+);
 /// How long the slowest module may take to send again after a rest.
 const AWAKE_LIMIT: Duration = Duration::from_secs(1);
 
@@ -128,9 +139,11 @@ impl Machine {
                 .control(now, DriveCommand::QuickStop);
         }
         let mut unconfirmed = BTreeMap::new();
+        // All were told at once, so all share one limit.
+        let wait = Watched::in_silence(now, STOP_LIMIT, self.patience);
         for at in &may_move {
             // A drive that is gone cannot confirm; the others must still be stopped.
-            if let Err(failure) = self.await_outcome(*at, "quick stop", STOP_LIMIT) {
+            if let Err(failure) = self.await_watched(*at, "quick stop", wait.clone()) {
                 unconfirmed.insert(*at, failure);
             }
         }
@@ -143,11 +156,19 @@ impl Machine {
                 .drive_mut(*at)
                 .control(now, DriveCommand::Disable);
         }
+        let wait = Watched::in_silence(now, STOP_LIMIT, self.patience);
         for at in &may_move {
-            if let Err(failure) = self.await_outcome(*at, "disable", STOP_LIMIT) {
+            if let Err(failure) = self.await_watched(*at, "disable", wait.clone()) {
                 unconfirmed.entry(*at).or_insert(failure);
             }
         }
+        // One that is silent is warned of below.
+        let is_heard = |at: &usize| {
+            let place = self.devices.drive(*at).place();
+            !unconfirmed.contains_key(at) || place.is_some_and(|place| place.at > now)
+        };
+        let heard = may_move.iter().copied().filter(is_heard).collect();
+        await_rest(self, heard);
         let mut search = CauseSearch { machine: self };
         search.look();
         for (at, failure) in unconfirmed {

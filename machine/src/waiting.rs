@@ -16,6 +16,7 @@ const START_LIMIT: Duration = Duration::from_secs(15);
 const SILENT: Duration = Duration::from_secs(2);
 
 /// A wait for devices that may not be there: whoever watches is told what is being waited for.
+#[derive(Clone)]
 pub(crate) struct Watched {
     patience: Patience,
     begun: Time,
@@ -36,7 +37,7 @@ impl Watched {
     }
 
     /// The same, of a device that is there: nobody is told anything.
-    fn in_silence(now: Time, limit: Duration, patience: Patience) -> Self {
+    pub(crate) fn in_silence(now: Time, limit: Duration, patience: Patience) -> Self {
         Self {
             tell: Time::NEVER,
             ..Self::new(now, limit, patience)
@@ -108,7 +109,7 @@ impl Machine {
         self.await_watched(at, "start", wait)
     }
 
-    fn await_watched(
+    pub(crate) fn await_watched(
         &mut self,
         at: usize,
         step: &'static str,

@@ -36,7 +36,7 @@ pub use figures::{Figures, Minute};
 pub use http::{Edge, EdgeError, Listen, ListenError, openapi};
 pub use ledger::LedgerError;
 pub use manager::Manager;
-pub use problem::{Code, Problem, ProblemBody};
+pub use problem::{Code, Problem, ProblemBody, failure_code};
 pub use quantity::{Quantity, Speed};
 pub use request::{
     AnswerRequest, ApproachName, Caller, GivenFile, IfMoving, JogRequest, LeaseRequest,

@@ -297,6 +297,13 @@ impl From<Failure> for Problem {
     }
 }
 
+/// The code of `failure` as programs read it: `drive_state`.
+pub fn failure_code(failure: &Failure) -> String {
+    let code = serde_json::to_value(code_of(failure));
+    let text = code.ok().and_then(|code| code.as_str().map(str::to_owned));
+    text.expect("a code is a word")
+}
+
 /// What kind of problem a failure is.
 pub(crate) fn code_of(failure: &Failure) -> Code {
     match failure {

@@ -20,13 +20,13 @@ const STOPPED_WITHIN: Duration = Duration::from_millis(500 + 100 + 100);
 const STANDS_MM: f64 = 1e-3;
 
 /// Somebody who only looks: time passes while it waits.
-struct Watcher {
+pub(crate) struct Watcher {
     clock: PathBuf,
     time: Steps,
 }
 
 impl Watcher {
-    fn of(bench: &Bench) -> Self {
+    pub(crate) fn of(bench: &Bench) -> Self {
         Self {
             clock: bench.folder().join("clock"),
             time: Steps::of(bench),
@@ -44,12 +44,17 @@ impl Watcher {
         ["x_mm", "y_mm", "z_mm"].map(|key| number(&truth[key]))
     }
 
-    fn truth(&self) -> Value {
+    pub(crate) fn truth(&self) -> Value {
         let truth = lend_hand(&self.clock, "truth").expect("the truth");
         serde_json::from_str(&truth).expect("an object")
     }
 
-    fn wait(&mut self, span: Duration) {
+    /// Does what a hand at the machine could do.
+    pub(crate) fn lend_hand(&self, words: &str) {
+        lend_hand(&self.clock, words).expect("it is done");
+    }
+
+    pub(crate) fn wait(&mut self, span: Duration) {
         self.time.pass(span);
     }
 }

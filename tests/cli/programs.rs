@@ -65,7 +65,12 @@ impl Process {
     /// Likewise, at a terminal of its own, say.
     pub(crate) fn start_at(command: &mut Command, input: Stdio) -> Self {
         let command = command.stdin(input).stdout(Stdio::piped());
-        let child = command.stderr(Stdio::piped()).spawn();
+        Self::spawn(command.stderr(Stdio::piped()))
+    }
+
+    /// The same with its streams as `command` has them.
+    pub(crate) fn spawn(command: &mut Command) -> Self {
+        let child = command.spawn();
         Self {
             child: child.unwrap_or_else(|error| panic!("{command:?}: {error}")),
             is_client: false,
@@ -96,6 +101,11 @@ impl Process {
             // A signal only makes the next look come sooner.
             let _ = poll(&mut fds, PollTimeout::from(LOOK_EVERY_MS));
         }
+    }
+
+    pub(crate) fn has_ended(&mut self) -> bool {
+        let ended = self.child.try_wait().expect("a child can be asked");
+        ended.is_some()
     }
 
     /// # Panics
@@ -366,8 +376,15 @@ impl Bench {
 
     /// The same, with these variables in its environment.
     pub(crate) fn start_within(&self, words: &[&str], variables: &[(&str, &str)]) -> Process {
+        let mut command = self.verb(words);
+        let mut process = Process::start(command.envs(variables.iter().copied()));
+        process.is_client = self.folder().join(SOCKET).exists();
+        process
+    }
+
+    /// The verb, not started yet.
+    pub(crate) fn verb(&self, words: &[&str]) -> Command {
         let mut command = self.command();
-        command.envs(variables.iter().copied());
         // `plan zero` is one verb.
         let verb = if words.starts_with(&["plan", "zero"]) {
             2
@@ -401,9 +418,7 @@ impl Bench {
             }
         }
         command.args(&words[verb..]);
-        let mut process = Process::start(&mut command);
-        process.is_client = self.folder().join(SOCKET).exists();
-        process
+        command
     }
 
     /// The same, and waits for its end.

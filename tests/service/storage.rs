@@ -94,9 +94,10 @@ fn a_stop_voids_what_waits_for_the_disk() {
         assert_eq!(motion.status, 201, "{motion:?}");
         let motion = motion.json();
         assert_eq!(motion["state"], "stopped", "{motion}");
-        assert_eq!(motion["stopped"]["by"], "bert", "{motion}");
+        let by = motion["stopped"]["by"].as_str().expect("a name");
+        assert!(by.starts_with("bert"), "{motion}");
         let run = http.run(&run.unwrap(), PATIENCE).unwrap();
-        assert_eq!(run.stopped.unwrap().by, "bert");
+        assert!(run.stopped.unwrap().by.starts_with("bert"));
         // It ended so for good: the same request is the same motion.
         let again = begin(http, &to(10.0), Some("motion"));
         assert_eq!((again.status, &again.json()["id"]), (200, &motion["id"]));

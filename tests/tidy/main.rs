@@ -188,7 +188,6 @@ fn the_library_alone_links_no_command_line_and_no_emulator() {
     assert!(tree.contains("machine v"), "no tree: {tree}");
     let absent = [
         "clap v",
-        "indicatif v",
         "signal-hook v",
         "mock-bus v",
         "axum v",
@@ -197,6 +196,50 @@ fn the_library_alone_links_no_command_line_and_no_emulator() {
     for absent in absent {
         assert!(!tree.contains(absent), "{absent}:\n{tree}");
     }
+}
+
+/// A write to a terminal that is held waits for hours: no thread that owns a machine or answers a client may make one.
+#[test]
+fn standard_streams_have_one_writer() {
+    const WRITES: &[&str] = &[
+        "print!(",
+        "println!(",
+        "eprint!(",
+        "eprintln!(",
+        "stdout()",
+        "stderr()",
+        "dbg!(",
+    ];
+    for folder in [
+        "drivers/src",
+        "machine/src",
+        "controller/src",
+        "service/src",
+        "command/src",
+    ] {
+        let mut files = sources(folder);
+        files.remove("controller/src/program/streams.rs");
+        for (name, text) in files {
+            if is_test_file(&name) {
+                continue;
+            }
+            for (line, code) in code_lines(without_tests(&text)) {
+                let found = WRITES.iter().find(|word| code.contains(**word));
+                assert_eq!(found, None, "{name}:{line}: use `streams`");
+            }
+        }
+    }
+}
+
+/// A module of tests in a file of its own.
+fn is_test_file(name: &str) -> bool {
+    let is_test = |part: &str| {
+        part == "tests.rs"
+            || part.ends_with("_tests.rs")
+            || part.ends_with("_tests")
+            || part == "rates.rs"
+    };
+    name.split('/').any(is_test)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What is said before anything moves: on a terminal it is shown and asked for, with `--dry-run` it is all that happens.
 
-use std::io::{BufRead, IsTerminal, stderr, stdin};
+use std::io::{BufRead, IsTerminal, stdin};
 
 use machine::records::{Lease, short};
 use serde_json::{Value, json};
@@ -13,6 +13,7 @@ use crate::program::intended::{Intent, Step};
 use crate::program::kept::{self, Service};
 use crate::program::kind::{KINDS, by_kind};
 use crate::program::output::{Ended, Output};
+use crate::program::streams;
 use crate::program::verbs::Verbs;
 
 /// Does what is intended, once it has been said what that is and nobody has objected: here, or by the service that
@@ -47,7 +48,7 @@ pub(crate) fn said(
         let ended = output.result(&told(loaded, steps), &value(loaded, steps));
         return Ok(Some(ended));
     }
-    let is_asked = stdin().is_terminal() && stderr().is_terminal();
+    let is_asked = stdin().is_terminal() && streams::is_err_terminal();
     if !ask.yes && is_asked && steps.iter().any(Step::moves) {
         output.must_say(&told(loaded, steps));
         if is_kept(loaded) && zeroes_first {

@@ -26,7 +26,7 @@ use crate::program::exchange::{LOST, ask, ask_on, exit_code_of, plain};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
 use crate::program::rotary::readings::is_turned_by_hand;
-use crate::program::session::stop_on_signals;
+use crate::program::signals::stop_on_signals;
 use crate::program::{AskArgs, AxisArgs, MachineArgs, VerifyArgs};
 use crate::runs::Choice;
 use heard::Heard;
@@ -409,15 +409,19 @@ fn refuse(is_given: bool, option: &str) -> Result<(), Failure> {
 
 fn stopped(seen: &Value) -> Failure {
     let by = plain(seen["stopped"]["by"].as_str().unwrap_or("somebody"));
-    let goes_on = match (&seen["can_resume"], seen["journal"].as_str()) {
+    Failure::Kept {
+        said: format!("stopped by {by}; the axes stand{}", goes_on(seen)),
+        exit_code: machine::Failure::Interrupted.exit_code(),
+    }
+}
+
+/// How a run that ended before its result is continued.
+fn goes_on(seen: &Value) -> String {
+    match (&seen["can_resume"], seen["journal"].as_str()) {
         (Value::Bool(true), Some(journal)) => {
             format!("; go on with --resume ({})", plain(journal))
         }
         _ => String::new(),
-    };
-    Failure::Kept {
-        said: format!("stopped by {by}; the axes stand{goes_on}"),
-        exit_code: machine::Failure::Interrupted.exit_code(),
     }
 }
 
@@ -439,12 +443,9 @@ fn paused(seen: &Value, asked: Option<machine::Failure>) -> Failure {
 
 fn failed(seen: &Value) -> Failure {
     let cause = &seen["cause"];
+    let why = cause["cause"].as_str();
     Failure::Kept {
-        said: plain(
-            cause["cause"]
-                .as_str()
-                .unwrap_or("the service says no cause"),
-        ),
+        said: plain(why.unwrap_or("the service says no cause")) + &goes_on(seen),
         exit_code: exit_code_of(cause).unwrap_or(LOST),
     }
 }

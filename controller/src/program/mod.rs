@@ -55,9 +55,11 @@ mod serve;
 mod session;
 mod shell;
 mod show;
+mod signals;
 mod span;
 #[cfg(test)]
 mod stored_tests;
+mod streams;
 mod targets;
 mod text;
 mod token;
@@ -339,13 +341,28 @@ struct ServiceArgs {
 }
 
 /// Runs the command line of this process; `keep` keeps a machine for `truestage serve`, `enrol` makes a token for
-/// `truestage token` and returns it, and `version` is what `--version` says of this program.
+/// `truestage token` and returns it, `code_of` names failures for programs, and `version` is what `--version` says of
+/// this program.
 pub fn main(
     keep: fn(Serving) -> Result<(), crate::Failure>,
     enrol: fn(NewToken) -> Result<String, crate::Failure>,
+    code_of: fn(&crate::Failure) -> String,
     version: &'static str,
 ) -> ExitCode {
     made_by::this_is(version);
+    output::name_failures_by(code_of);
+    signals::outlive_full_files();
+    let code = run(keep, enrol, version);
+    // What could not be printed was said where it was given.
+    let _ = streams::finish();
+    code
+}
+
+fn run(
+    keep: fn(Serving) -> Result<(), Failure>,
+    enrol: fn(NewToken) -> Result<String, Failure>,
+    version: &'static str,
+) -> ExitCode {
     let words = with_examples(Cli::command())
         .version(version)
         .try_get_matches();

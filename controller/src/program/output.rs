@@ -1,6 +1,6 @@
 //! stdout for results, stderr for everything else, in the order in which it was said.
 
-use std::io::{ErrorKind, Write, stdout};
+use std::sync::OnceLock;
 
 use serde_json::{Map, Value, json};
 
@@ -8,7 +8,8 @@ use crate::Failure;
 use crate::config::ConfigError;
 use crate::program::paint;
 use crate::program::plain::plain;
-use crate::program::progress::{self, Bars};
+use crate::program::progress::Bars;
+use crate::program::streams;
 use crate::runs::Told;
 
 /// How a verb ended: well, with a result that is a failure all the same (already printed with
@@ -27,36 +28,6 @@ pub(crate) const SCHEMA: u32 = 1;
 
 /// What stands for the verb where the words of the command line name none that can be run.
 pub(crate) const NO_VERB: &str = "";
-
-/// Who reads what is printed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Reader {
-    Listens,
-    /// It closed the pipe (`| head`), which is its right and no failure of the machine.
-    Left,
-}
-
-/// Writes `bytes` to `out`, which is standard output but in tests. It is flushed here, where an error can still be told:
-/// at the end of a program nobody looks at it.
-///
-/// # Errors
-/// When not all of it can be written: the disk is full.
-pub(crate) fn printed(out: &mut impl Write, bytes: &[u8]) -> Result<Reader, Failure> {
-    match out.write_all(bytes).and_then(|()| out.flush()) {
-        Ok(()) => Ok(Reader::Listens),
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Reader::Left),
-        Err(error) => Err(unprinted(&error)),
-    }
-}
-
-/// That what was printed is not whole, and why.
-pub(crate) fn unprinted(why: &std::io::Error) -> Failure {
-    Failure::Usage {
-        what: format!("standard output cannot be written: {why}"),
-        help: "what is there is not whole: give it another place; what was measured or stored is kept all the same"
-            .into(),
-    }
-}
 
 /// How much is said on standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -150,11 +121,12 @@ impl Output {
     fn print(self, text: &str, value: &Value) -> Result<(), Failure> {
         let line = match self.json {
             true => self.object(value),
-            false if paint::is_wanted(&stdout()) => paint::painted(&plain(text)),
+            false if streams::is_out_terminal() && paint::is_wanted() => {
+                paint::painted(&plain(text))
+            }
             false => plain(text),
         };
-        progress::settle();
-        printed(&mut stdout().lock(), (line + "\n").as_bytes()).map(|_| ())
+        streams::print((line + "\n").into_bytes()).map(drop)
     }
 
     /// What goes with a failure: that one decides how the command ends, and what is not printed is said beside it.
@@ -194,14 +166,12 @@ impl Output {
 
     /// Errors, and questions with what must be known to answer them.
     pub(crate) fn must_say(self, text: &str) {
-        progress::settle();
-        let is_painted = !self.json && paint::is_wanted(&std::io::stderr());
+        let is_painted = !self.json && streams::is_err_terminal() && paint::is_wanted();
         let text = plain(text);
-        let line = match is_painted {
+        streams::say(&match is_painted {
             true => paint::painted(&text),
             false => text,
-        };
-        let _ = writeln!(std::io::stderr().lock(), "{line}");
+        });
     }
 
     /// Why the command line was refused, for programs.
@@ -216,41 +186,45 @@ impl Output {
             if let Failure::Config(ConfigError::Invalid { findings }) = failure {
                 error["findings"] = json!(findings);
             }
+            describe(failure, &mut error);
             self.print_failed("", &error);
         }
         self.must_say(&format!("error: {failure}"));
     }
 }
 
+/// The kind of a failure, as a service names it.
+static CODE_OF: OnceLock<fn(&Failure) -> String> = OnceLock::new();
+
+/// Names failures by `code_of` from now on.
+pub(super) fn name_failures_by(code_of: fn(&Failure) -> String) {
+    // A program has one main function.
+    let _ = CODE_OF.set(code_of);
+}
+
+/// Adds to the object of `failure` what a program that reads it acts upon.
+fn describe(failure: &Failure, object: &mut Value) {
+    let source = match failure {
+        Failure::Resumable { source, journal } => {
+            object["journal"] = json!(journal);
+            object["can_resume"] = json!(true);
+            source
+        }
+        other => other,
+    };
+    if let Failure::Machine(failure) = source
+        && let Some(device) = failure.device()
+    {
+        object["device"] = json!(device);
+    }
+    if let Some(code_of) = CODE_OF.get() {
+        object["code"] = json!(code_of(source));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// What takes nothing any more, for a reason.
-    struct Full(ErrorKind);
-
-    impl Write for Full {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> std::io::Result<()> {
-            Err(self.0.into())
-        }
-    }
-
-    #[test]
-    fn what_is_not_whole_where_it_is_printed_is_a_failure_and_a_closed_pipe_is_none() {
-        let print = |kind| printed(&mut Full(kind), b"a,b\n");
-        assert_eq!(print(ErrorKind::BrokenPipe).unwrap(), Reader::Left);
-        let failure = print(ErrorKind::StorageFull).unwrap_err();
-        assert_eq!(failure.exit_code(), 2);
-        let said = failure.to_string();
-        assert!(
-            said.contains("standard output cannot be written: no storage space"),
-            "{said}"
-        );
-    }
 
     #[test]
     fn every_object_says_its_version_and_its_verb() {

@@ -4,7 +4,6 @@
 
 use core::fmt::Write as _;
 use std::env;
-use std::io::IsTerminal;
 
 use clap::builder::styling::{AnsiColor, Style};
 
@@ -31,11 +30,15 @@ const ENDS: [(&str, Style); 3] = [
     (SHOWS_NOTHING, BAD),
 ];
 
-/// Whether `stream` is read by a person who has not asked for plain text (<https://no-color.org>).
-pub(super) fn is_wanted(stream: &impl IsTerminal) -> bool {
-    let is_plain = env::var_os("NO_COLOR").is_some_and(|it| !it.is_empty());
-    let is_dumb = env::var_os("TERM").is_some_and(|it| it == "dumb");
-    stream.is_terminal() && !is_plain && !is_dumb
+/// Whether the person at a terminal has not asked for plain text (<https://no-color.org>).
+pub(super) fn is_wanted() -> bool {
+    let is_plain = env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    !is_plain && !is_dumb()
+}
+
+/// Whether the terminal says that it obeys nothing.
+pub(super) fn is_dumb() -> bool {
+    env::var_os("TERM").is_some_and(|name| name == "dumb")
 }
 
 /// `text` with its colours.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use machine::records::Store;
+use machine::records::{AnyLog, Store, StoreError, read_journal};
 
 use crate::Failure;
 use crate::program::NEWEST_RUN;
@@ -36,7 +36,8 @@ pub(crate) fn journal_to_resume(
     }
 }
 
-/// Runs what writes a journal of `verb` on `axis`; when somebody stops it, says how it goes on.
+/// Runs what writes a journal of `verb` on `axis`. When it is stopped, or a device or the disk fails, says how it goes
+/// on.
 pub(crate) fn resumable<R>(
     store: &Store,
     verb: &str,
@@ -46,7 +47,6 @@ pub(crate) fn resumable<R>(
 ) -> Result<R, Failure> {
     let before = store.newest_run(verb, axis)?;
     run().map_err(|failure| {
-        let is_asked = matches!(&failure, Failure::Machine(failure) if failure.is_stop());
         let begun = || {
             store
                 .newest_run(verb, axis)
@@ -54,13 +54,24 @@ pub(crate) fn resumable<R>(
                 .filter(|it| Some(it) != before.as_ref())
         };
         match resumed.map(Path::to_owned).or_else(begun) {
-            Some(journal) if is_asked => Failure::Resumable {
+            Some(journal) if goes_on(&failure, &journal) => Failure::Resumable {
                 source: Box::new(failure),
                 journal,
             },
             _ => failure,
         }
     })
+}
+
+/// Whether the run of `journal` goes on once the cause of `failure` is gone. What refuses the measured values refuses
+/// them again.
+fn goes_on(failure: &Failure, journal: &Path) -> bool {
+    let is_disk = matches!(
+        failure,
+        Failure::File { .. } | Failure::Store(StoreError::Io { .. })
+    );
+    let is_incomplete = || read_journal::<AnyLog>(journal).is_ok_and(|read| !read.complete);
+    failure.is_stop() || (is_disk || failure.stops_the_machine()) && is_incomplete()
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ pub struct Serving {
     /// Writes down where it is found, for whoever finds the machine in use.
     pub announce: Box<Announcing>,
     /// Tells whoever started it something.
-    pub told: Box<dyn Fn(&str)>,
+    pub told: Arc<dyn Fn(&str) + Send + Sync>,
 }
 
 /// A machine that is kept, and where it is found.
@@ -97,7 +97,7 @@ pub(crate) fn run(
             words: KINDS.iter().map(|kind| kind.words).collect(),
         },
         announce: Box::new(move |places| announce(&taken, places)),
-        told: Box::new(move |text| output.note(text)),
+        told: Arc::new(move |text| output.note(text)),
     })?;
     Ok(None)
 }

@@ -12,9 +12,9 @@ use crate::config::{self, Loaded};
 use crate::ports::{self, Overrides, Use};
 use crate::program::output::Output;
 use crate::program::progress::Bars;
+use crate::program::signals::stop_on_signals;
 use crate::program::{AxisArgs, MachineArgs};
 use crate::{Failure, Machine, assemble};
-use machine::StopRequest;
 use machine::records::Store;
 
 /// Verbs by which nothing moves, whatever the configuration says.
@@ -118,25 +118,6 @@ fn new_file(path: &Path) -> Result<File, Failure> {
         }
         created => created.map_err(failed),
     }
-}
-
-/// Ctrl-C and termination ask for a controlled stop; a second one ends the process at once,
-/// and the drives, which watch our heartbeat, stop by themselves.
-pub(crate) fn stop_on_signals(stop: &StopRequest) -> Result<(), Failure> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let failed = |source| Failure::File {
-        path: "signal handler".into(),
-        source,
-    };
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // A shell's exit code of a program that a signal has ended.
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, stop.flag())
-            .map_err(failed)?;
-        let number = usize::try_from(signal).unwrap_or_default();
-        signal_hook::flag::register_usize(signal, stop.signal(), number).map_err(failed)?;
-        signal_hook::flag::register(signal, stop.flag()).map_err(failed)?;
-    }
-    Ok(())
 }
 
 /// The axis asked for, or the only one of `names`.

@@ -1,6 +1,5 @@
 //! What a shell and its user want of the words of this program: completions and manual pages.
 
-use std::io::stdout;
 use std::path::PathBuf;
 
 use clap::{Args, Command};
@@ -8,7 +7,8 @@ use clap_complete::Shell;
 use serde_json::json;
 
 use crate::Failure;
-use crate::program::output::{Ended, Output, printed};
+use crate::program::output::{Ended, Output};
+use crate::program::streams;
 
 /// For which shell.
 #[derive(Clone, Copy, Debug, Args)]
@@ -30,7 +30,7 @@ pub(crate) fn completions(args: CompletionsArgs, mut words: Command) -> Ended {
     let mut script = Vec::new();
     let name = words.get_name().to_owned();
     clap_complete::generate(args.shell, &mut words, name, &mut script);
-    printed(&mut stdout().lock(), &script)?;
+    streams::print(script)?;
     Ok(None)
 }
 

@@ -31,7 +31,8 @@ pub mod umd2;
 use core::time::Duration;
 
 use units::{
-    Approach, Celsius, Coordinate, Counts, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
+    Approach, Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, Radians,
+    RelativeHumidity, Time, Volts,
 };
 use wire::Input;
 use wire::Payload;
@@ -144,11 +145,25 @@ pub trait ServoDrive: Device {
         Err(ReferenceLost::NotHomed)
     }
 
+    /// Where the axis was by the newest sample, whatever it moves in.
+    fn place(&self) -> Option<Place>;
+
     /// When the last motion was seen to be begun: on CAN the arrival of the first statusword
     /// that acknowledges the set-point, on a serial line that of the amplifier's `ok`; when
     /// that was lost, the moment it was to start, since the motion may be as old. `None`
     /// before the first motion and from a new command until its motion begins.
     fn started_at(&self) -> Option<Time>;
+}
+
+/// One sample of an axis, whatever it moves in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// When it arrived.
+    pub at: Time,
+    /// The encoder, drive coordinates.
+    pub position: LengthOrAngle,
+    /// Whether the last samples lie together, wherever that is.
+    pub stands: bool,
 }
 
 /// What every drive can be told, whatever it moves.

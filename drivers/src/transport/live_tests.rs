@@ -229,6 +229,21 @@ fn a_line_is_for_one_program_and_for_the_next_once_it_was_given_back() {
     assert!(another_can_open(&pty), "it was given back");
 }
 
+/// Root is let in by the system in any case, and refused by the lock.
+#[test]
+fn a_program_that_is_refused_leaves_a_line_to_the_one_that_has_it() {
+    let pty = Pty::new();
+    let live = serial(&pty);
+    let refused = Live::builder(Clock::real())
+        .serial(PORT, &pty.path, SerialSettings::new(9_600))
+        .build();
+    let refused = refused.map(drop).unwrap_err().to_string();
+    assert!(refused.contains("another program has it open"), "{refused}");
+    assert!(!another_can_open(&pty), "it is still open");
+    drop(live);
+    assert!(another_can_open(&pty), "it was given back");
+}
+
 #[test]
 fn no_arrival_by_the_deadline_is_none() {
     let pty = Pty::new();

@@ -3,10 +3,12 @@
 
 use core::time::Duration;
 use nix::errno::Errno;
-use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::fcntl::{FcntlArg, Flock, FlockArg, OFlag, fcntl};
 use nix::sys::termios::{BaudRate, SetArg, cfsetspeed, tcgetattr, tcsetattr};
 use std::collections::VecDeque;
+use std::fs::File;
 use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::sync::Arc;
 use tokio_serial::SerialPort as _;
 use units::Time;
@@ -24,6 +26,8 @@ const READ_MAX: usize = 4_096;
 const PENDING_MAX: usize = 4_096;
 const FIRST_RETRY: Duration = Duration::from_millis(100);
 const RETRY_MAX: Duration = Duration::from_secs(2);
+
+const IN_USE: &str = "another program has it open, or it is not a serial device";
 
 /// The parity bit of a serial line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,12 +103,15 @@ pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OpenLine, Se
         StopBits::One => tokio_serial::StopBits::One,
         StopBits::Two => tokio_serial::StopBits::Two,
     };
+    let held = require_alone(path)?;
     let mut port = tokio_serial::new(path, settings.baud)
         .data_bits(data_bits)
         .parity(parity)
         .stop_bits(stop_bits)
         .open_native()
         .map_err(|error| explain(path, error))?;
+    // Not before: the adapter would see a line that was dropped.
+    drop(held);
     // A pty has no modem lines (ENOTTY), some adapters do not either.
     if let Some(level) = settings.dtr {
         let _ = port.write_data_terminal_ready(level);
@@ -122,20 +129,49 @@ pub(super) fn open(path: &str, settings: &SerialSettings) -> Result<OpenLine, Se
     Ok(descriptor)
 }
 
+/// Opens the line at `path` where no other program has locked it.
+///
+/// The library gives up the exclusive use of a line (TIOCNXCL) also where it did not get its lock, and would take it
+/// from the program that has it.
+fn require_alone(path: &str) -> Result<File, SerialError> {
+    let flags = OFlag::O_NOCTTY | OFlag::O_NONBLOCK;
+    let opened = File::options()
+        .read(true)
+        .write(true)
+        .custom_flags(flags.bits())
+        .open(path);
+    let file = opened.map_err(|source| SerialError {
+        help: help_for(path),
+        source,
+    })?;
+    let in_use = |errno: Errno| SerialError {
+        source: errno.into(),
+        help: IN_USE,
+    };
+    let locked = Flock::lock(file, FlockArg::LockExclusiveNonblock);
+    let locked = locked.map_err(|(_, errno)| in_use(errno))?;
+    locked.unlock().map_err(|(_, errno)| in_use(errno))
+}
+
 fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
-    let source = std::io::Error::from(error);
-    // tokio-serial folds every cause into "no device": ask the file system.
-    let help = match std::fs::metadata(path) {
+    SerialError {
+        source: error.into(),
+        help: help_for(path),
+    }
+}
+
+/// What to do where a line cannot be opened. tokio-serial folds every cause into "no device": ask the file system.
+fn help_for(path: &str) -> &'static str {
+    match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
             "no permission; add the user to the group of the device (often `dialout`)"
         }
         Err(_) => "`ls /dev/serial/by-id` lists what is plugged in",
-        Ok(_) if std::fs::File::open(path).is_err_and(|e| is_denied(&e)) => {
+        Ok(_) if File::open(path).is_err_and(|e| is_denied(&e)) => {
             "no permission; add the user to the group of the device (often `dialout`)"
         }
-        Ok(_) => "another program has it open, or it is not a serial device",
-    };
-    SerialError { source, help }
+        Ok(_) => IN_USE,
+    }
 }
 
 fn is_denied(error: &std::io::Error) -> bool {

@@ -59,7 +59,12 @@ pub struct Access {
     pub(crate) tls: Option<Arc<Tls>>,
     pub(crate) tokens: Option<Arc<KnownTokens>>,
     pub(crate) everywhere: bool,
+    /// Says to the person who started the service what is wrong with its files.
+    pub(crate) say: Option<Say>,
 }
+
+/// Says a line without ever waiting.
+pub type Say = Arc<dyn Fn(&str) + Send + Sync>;
 
 impl fmt::Debug for Access {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -93,7 +98,15 @@ impl Access {
             tls,
             tokens,
             everywhere: files.everywhere,
+            say: None,
         })
+    }
+
+    /// The same, which says by `say` what is wrong with its files. `say` must not wait.
+    #[must_use]
+    pub fn saying(mut self, say: Say) -> Self {
+        self.say = Some(say);
+        self
     }
 
     /// Whether it may be listened to beyond this computer.

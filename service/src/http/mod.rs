@@ -58,7 +58,8 @@ impl Edge {
         let mut tokens = access.tokens.clone();
         Self::serve(places, access, |place, closing| {
             if let Some(known) = tokens.take() {
-                tokio::spawn(tokens::watch(known, desk.clone(), closing.clone()));
+                let say = access.say.clone();
+                tokio::spawn(tokens::watch(known, say, desk.clone(), closing.clone()));
             }
             let state = State::new(desk.clone(), closing);
             let guarded = Guarded::new(place, access, desk.stops());

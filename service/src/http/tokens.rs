@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tokio::time::sleep;
 
 use super::state::Closing;
-use crate::access::KnownTokens;
+use crate::access::{KnownTokens, Say};
 use crate::desk::Desk;
 use crate::order::Order;
 use crate::request::Caller;
@@ -15,11 +15,16 @@ use crate::request::Caller;
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// Until the edge closes: one event and one line on standard error for each thing that is wrong, and for its end.
-pub(super) async fn watch(tokens: Arc<KnownTokens>, desk: Desk, mut closing: Closing) {
+pub(super) async fn watch(
+    tokens: Arc<KnownTokens>,
+    say: Option<Say>,
+    desk: Desk,
+    mut closing: Closing,
+) {
     let mut told = None;
     loop {
         let wrong = tokens.trouble().map(|it| it.to_string());
-        if wrong != told && tell(&desk, wrong.as_deref()) {
+        if wrong != told && tell(&desk, say.as_ref(), wrong.as_deref()) {
             told = wrong;
         }
         tokio::select! {
@@ -30,7 +35,7 @@ pub(super) async fn watch(tokens: Arc<KnownTokens>, desk: Desk, mut closing: Clo
 }
 
 /// Whether it could be told.
-fn tell(desk: &Desk, wrong: Option<&str>) -> bool {
+fn tell(desk: &Desk, say: Option<&Say>, wrong: Option<&str>) -> bool {
     let text = match wrong {
         Some(wrong) => format!(
             "the file of tokens cannot be used, and tokens do no more than stop until it is put right: {wrong}"
@@ -40,8 +45,8 @@ fn tell(desk: &Desk, wrong: Option<&str>) -> bool {
     let order = Order::Warn { text: text.clone() };
     // Orders that wait are sent first: it is told a look later.
     let is_told = desk.give(&Caller::named("the edge"), order).is_ok();
-    if is_told {
-        eprintln!("warning: {text}");
+    if is_told && let Some(say) = say {
+        say(&format!("warning: {text}"));
     }
     is_told
 }

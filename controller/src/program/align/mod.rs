@@ -6,7 +6,6 @@ mod lines;
 mod picture;
 
 use core::time::Duration;
-use std::io::{IsTerminal, stdout};
 
 use clap::Args;
 use drivers::device::Signal;
@@ -16,9 +15,10 @@ use units::Time;
 
 use crate::ports::Use;
 use crate::program::MachineArgs;
-use crate::program::output::{Ended, Output, printed};
+use crate::program::output::{Ended, Output};
 use crate::program::session::Session;
 use crate::program::span::span_of;
+use crate::program::streams::{self, Reader};
 use crate::volumetric::sight::{Sight, Sights, references_in_use};
 use crate::{Failure, Machine, config};
 
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &AlignArgs, output: Output) -> Ended {
         true => loaded.config.instrument.keys().cloned().collect(),
         false => Vec::new(),
     };
-    let is_picture = !output.is_json() && !args.once && stdout().is_terminal();
+    let is_picture = !output.is_json() && !args.once && streams::is_out_terminal();
     let mut align = Align {
         shown: match is_picture {
             true => Shown::Picture(picture::Screen::new(&loaded.config.machine.name)),
@@ -138,8 +138,8 @@ impl Align {
             next = (next + every).min(end);
             self.watch(machine, next)?;
             let view = self.view(machine, started)?;
-            self.show(&view)?;
-            if args.once || next >= end {
+            let reader = self.show(&view)?;
+            if args.once || next >= end || reader == Reader::Left {
                 return Ok(());
             }
         }
@@ -179,12 +179,12 @@ impl Align {
         })
     }
 
-    fn show(&mut self, view: &View) -> Result<(), Failure> {
+    fn show(&mut self, view: &View) -> Result<Reader, Failure> {
         let text = match &mut self.shown {
             Shown::Picture(screen) => screen.draw(view),
             Shown::Lines if self.output.is_json() => self.output.object(&lines::value(view)) + "\n",
             Shown::Lines => format!("{}\n", lines::line(view)),
         };
-        printed(&mut stdout().lock(), text.as_bytes()).map(|_| ())
+        streams::show(text.into_bytes())
     }
 }

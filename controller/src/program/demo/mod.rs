@@ -22,7 +22,7 @@ use crate::config::{self, Loaded};
 use crate::emulated::{Emulated, EmulatedOnPtys};
 use crate::program::output::{Ended, Output};
 use crate::program::progress::Bars;
-use crate::program::session::stop_on_signals;
+use crate::program::signals::stop_on_signals;
 use crate::{Failure, Machine};
 
 #[derive(Debug, Args)]

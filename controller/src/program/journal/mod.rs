@@ -16,7 +16,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::Failure;
-use crate::program::output::{Ended, Output, printed};
+use crate::program::output::{Ended, Output};
+use crate::program::streams;
 use crate::program::written::create;
 use csv_text::csv_of;
 use entries::{Entry, entries_of};
@@ -122,7 +123,7 @@ fn export(args: &ExportArgs, output: Output) -> Ended {
     match (args.is_printed(), tables.as_slice()) {
         (false, tables) => as_files(args, tables, output),
         (true, [table]) => {
-            printed(&mut io::stdout().lock(), csv_of(table).as_bytes())?;
+            streams::print(csv_of(table).into_bytes())?;
             Ok(None)
         }
         (true, tables) => Err(Failure::Usage {

@@ -8,7 +8,6 @@ mod feed;
 mod picture;
 mod words;
 
-use std::io::{IsTerminal, stdout};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -16,8 +15,9 @@ use clap::Args;
 
 use crate::program::ServiceArgs;
 use crate::program::exchange::ask;
-use crate::program::output::{Ended, Output, Reader, printed};
+use crate::program::output::{Ended, Output};
 use crate::program::span::span_of;
+use crate::program::streams::{self, Reader};
 use feed::{Heard, Wanted};
 
 /// So many past events are asked for to begin with: what the picture has room for.
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &MonitorArgs, output: Output) -> Ended {
     let machine = ask(at, "GET", "/v1/machine", "")?;
     let newest = machine["newest_event"].as_u64().unwrap_or_default();
     let until = Instant::now() + args.span.unwrap_or(FOR_EVER);
-    if stdout().is_terminal() && !output.is_json() {
+    if streams::is_out_terminal() && !output.is_json() {
         let wanted = Wanted {
             after: args.after(newest, EVENTS),
             picture: true,
@@ -84,7 +84,7 @@ fn lines(heard: &Receiver<Heard>, until: Instant, output: Output) -> Ended {
             Ok(Heard::Machine(_) | Heard::Axes(_) | Heard::Runs(_)) => continue,
             Err(RecvTimeoutError::Timeout) => return Ok(None),
         };
-        if printed(&mut stdout().lock(), (line + "\n").as_bytes())? == Reader::Left {
+        if streams::print((line + "\n").into_bytes())? == Reader::Left {
             return Ok(None);
         }
     }

@@ -6,7 +6,7 @@ mod found;
 mod questions;
 
 use std::fs::File;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin};
+use std::io::{ErrorKind, IsTerminal, Write, stdin};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,6 +20,7 @@ use crate::config::lines::MARK;
 use crate::ports::Overrides;
 use crate::program::data_text::read;
 use crate::program::output::{Ended, Output};
+use crate::program::streams;
 
 /// What it is made from.
 #[derive(Debug, Args)]
@@ -47,7 +48,7 @@ pub(crate) struct NewArgs {
 
 pub(crate) fn run(args: &NewArgs, output: Output) -> Ended {
     refuse_existing(&args.config)?;
-    let is_asked = !args.yes && stdin().is_terminal() && stderr().is_terminal();
+    let is_asked = !args.yes && stdin().is_terminal() && streams::is_err_terminal();
     let example = match (args.machine, is_asked) {
         (Some(which), _) => which,
         (None, true) => questions::which(output)?,

@@ -1,6 +1,6 @@
 //! What a verb prints: one form, or several where it depends on the machine or on what was asked.
 
-use super::shape::{Member, Shape, by_name, part, text, whole};
+use super::shape::{Member, Shape, by_name, part, text, truth, whole};
 
 /// One form of what a verb prints.
 #[derive(Clone, Debug)]
@@ -66,9 +66,19 @@ pub(super) fn of_failures() -> [(&'static str, Shape); 2] {
     ]
 }
 
-/// The members of every failure.
-pub(super) fn failure() -> [Member; 2] {
-    [("error", part("error")), ("exit_code", part("exit-code"))]
+/// The members of every failure without a result.
+pub(super) fn failure() -> [Member; 6] {
+    let journal = "What the run has measured is kept there.";
+    let resumes = "The same command with --resume continues it.";
+    let code = "The kind of failure, as a service names it.";
+    [
+        ("error", part("error")),
+        ("exit_code", part("exit-code")),
+        ("code?", text().about(code)),
+        ("device?", text().about("The device that failed.")),
+        ("journal?", text().about(journal)),
+        ("can_resume?", truth().about(resumes)),
+    ]
 }
 
 /// The same beside a result, which need not be a bad one.

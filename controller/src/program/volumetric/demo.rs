@@ -55,7 +55,7 @@ fn run(demo: &Demo, args: &DemoArgs, output: Output) -> Ended {
     let _lease = Lease::take(&store, "demo")?;
     let emulated = Emulated::new(description, args.seed, &loaded.config)?;
     let mut machine = Machine::new(&loaded, Box::new(emulated.transport()));
-    crate::program::session::stop_on_signals(&machine.stop_request())?;
+    crate::program::signals::stop_on_signals(&machine.stop_request())?;
     output.note(&format!(
         "truestage demo: emulated machine `{}` (stage {}), seed {}, in virtual time",
         section.name, section.stage_serial, args.seed

@@ -6,8 +6,8 @@ use wire::cia402::{OperationMode, PowerState, Statusword};
 use super::homing_place::HomingPlace;
 use super::{Activity, Cia402Drive};
 use crate::device::{
-    Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, DriveReference, ReferenceLost,
-    ServoDrive,
+    Axis, AxisCommand, AxisReading, DeviceError, DriveCommand, DriveReference, Place,
+    ReferenceLost, ServoDrive,
 };
 
 impl<Q: Coordinate> Cia402Drive<Q> {
@@ -61,6 +61,15 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
 
     fn watches_master(&self) -> bool {
         self.node.watches_master()
+    }
+
+    fn place(&self) -> Option<Place> {
+        let sample = self.image.sample()?;
+        Some(Place {
+            at: sample.at,
+            position: self.settings.scale.to_coordinate(sample.position).into(),
+            stands: self.image.plausible.stands(),
+        })
     }
 
     fn was_enabled(&self) -> bool {

@@ -50,7 +50,7 @@ use super::envelope::Envelope;
 use super::plausible::Plausible;
 use super::{
     Alarm, Axis, AxisCommand, AxisReading, Device, DeviceError, DeviceName, DriveCommand, Identity,
-    LineUse, Seen, ServoDrive,
+    LineUse, Place, Seen, ServoDrive,
 };
 use homing::{Homing, HomingPlace};
 use image::{Image, Look};
@@ -404,6 +404,16 @@ impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
 
     fn is_homed(&self) -> bool {
         self.homed
+    }
+
+    fn place(&self) -> Option<Place> {
+        let (at, position) = self.image.position()?;
+        let counts = position + self.origin;
+        Some(Place {
+            at,
+            position: self.settings.scale.to_coordinate(counts).into(),
+            stands: self.image.plausible.stands(),
+        })
     }
 
     fn was_enabled(&self) -> bool {

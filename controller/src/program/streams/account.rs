@@ -1,4 +1,4 @@
-//! What is said of a procedure where no terminal is: a line every few seconds of the machine's clock.
+//! Account of a procedure that runs: a line every few seconds of the machine's clock, and a bar.
 
 use core::time::Duration;
 
@@ -8,9 +8,12 @@ use units::Time;
 /// From line to line, when nothing is late. Signs come twice a second, so that no silence is longer than five.
 const EVERY: Duration = Duration::from_secs(4);
 
+/// The length of a bar.
+const BAR: u64 = 32;
+
 /// What an observer is told.
 #[derive(Clone, Debug)]
-pub(super) enum Sign {
+pub(in crate::program) enum Sign {
     /// The machine lives.
     Lives(Time),
     /// Steps of a stage are done.
@@ -26,8 +29,6 @@ pub(super) enum Sign {
         axis: String,
         takes: Duration,
     },
-    /// A line of its own.
-    Said(String),
 }
 
 /// What is being done, and since when.
@@ -52,7 +53,7 @@ enum Measure {
 
 /// Keeps account of what is done.
 #[derive(Default)]
-pub(super) struct Account {
+pub(in crate::program) struct Account {
     /// The first sign of life, and the last one.
     lived: Option<(Time, Time)>,
     /// When the last line was said.
@@ -65,7 +66,6 @@ impl Account {
     pub(super) fn take(&mut self, sign: Sign) -> Option<String> {
         match sign {
             Sign::Lives(now) => self.lives(now),
-            Sign::Said(line) => Some(line),
             Sign::Begins { stage, axis, takes } => {
                 self.begin(stage, axis, Measure::Takes(takes));
                 None
@@ -80,6 +80,12 @@ impl Account {
                 None
             }
         }
+    }
+
+    /// The bar of what is being done, without the end of its line.
+    pub(super) fn bar(&self) -> Option<String> {
+        let now = self.now();
+        self.task.as_ref().map(|task| task.bar(now))
     }
 
     fn now(&self) -> Time {
@@ -155,6 +161,21 @@ impl Task {
             Measure::Steps { done, total, .. } => format!("{name}, {done} of {total} done{left}"),
             Measure::Takes(_) => format!("{name}{left}"),
         }
+    }
+
+    fn bar(&self, now: Time) -> String {
+        let Measure::Steps { done, total, .. } = &self.measure else {
+            return format!("  {}", self.text(now));
+        };
+        let name = format!("{} {}", self.stage.text(), self.axis);
+        let filled = usize::try_from(done * BAR / (*total).max(1)).unwrap_or(0);
+        let mut bar = "=".repeat(filled) + ">";
+        bar.truncate(BAR as usize);
+        let left = self.left(now);
+        let left = left.map_or_else(String::new, |left| {
+            format!(" {:>4} left", format!("{:.0}s", left.as_secs_f64()))
+        });
+        format!("  {name:<14} [{bar:<32}] {done:>4}/{total:<4}{left}")
     }
 
     /// How much longer it takes, if it goes on as it went; `None` where that is not known, or has proved wrong.
