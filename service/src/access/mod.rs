@@ -64,7 +64,7 @@ pub struct Access {
 }
 
 /// Says a line without ever waiting.
-pub type Say = Arc<dyn Fn(&str) + Send + Sync>;
+pub(crate) type Say = Arc<dyn Fn(&str) + Send + Sync>;
 
 impl fmt::Debug for Access {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
