@@ -52,8 +52,8 @@ impl Disk {
             .0
             .changed
             .wait_timeout_while(self.state(), PATIENCE, |state| state.hanging == 0);
-        let (_, waited) = waited.unwrap_or_else(PoisonError::into_inner);
-        assert!(!waited.timed_out(), "nobody writes");
+        let timed_out = waited.unwrap_or_else(PoisonError::into_inner).1.timed_out();
+        assert!(!timed_out, "nobody writes");
     }
 
     /// No byte more has room.

@@ -207,7 +207,7 @@ impl Writer {
             })?;
             self.damaged = None;
         }
-        let (entries, damaged) = {
+        let (mut entries, damaged) = {
             let mut state = self.ledger.state();
             let left: Vec<_> = state.pending.drain(..).collect();
             let cause = self
@@ -217,6 +217,7 @@ impl Writer {
             refuse_notes(&mut state, left, cause);
             (state.memory.entries(), state.memory.damaged.clone())
         };
+        entries.sort_unstable_by_key(|entry| entry.number);
         let mut text = Line::Boot(self.ledger.boot).sealed();
         let mut add = |line: &Line| {
             // To write into a text cannot fail.
