@@ -29,6 +29,7 @@ mod schema;
 mod screw;
 mod serve;
 mod serve_kinds;
+mod slow_disk;
 mod soak;
 mod table;
 mod tutorial;

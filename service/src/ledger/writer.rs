@@ -227,8 +227,8 @@ impl Writer {
             .into_iter()
             .for_each(|name| add(&Line::Damaged(name)));
         for entry in &entries {
-            add(&entry.asked.line());
-            entry.end.iter().for_each(|end| add(&end.line()));
+            add(&Line::of_asked(&entry.asked));
+            entry.end.iter().for_each(|end| add(&Line::of_end(end)));
         }
         self.file.replace(text.as_bytes())?;
         let mut state = self.ledger.state();
