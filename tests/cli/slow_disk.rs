@@ -50,7 +50,7 @@ fn await_key(folder: &Path) {
 }
 
 #[test]
-fn a_motion_that_waits_for_a_slow_disk_does_not_begin_after_a_stop() {
+fn a_stop_voids_a_motion_on_a_slow_disk() {
     for rig in live_rigs() {
         let bench = Bench::new(rig);
         let service = keep(&bench);

@@ -128,6 +128,56 @@ fn a_stop_voids_what_waits_for_the_disk() {
     });
 }
 
+/// How long `ask` takes, which waits for no disk.
+fn look(name: &str, ask: &dyn Fn()) -> Duration {
+    let begun = Instant::now();
+    ask();
+    let taken = begun.elapsed();
+    println!("{name}: {:.1} ms", taken.as_secs_f64() * 1e3);
+    assert!(taken < AT_ONCE, "{name} took {taken:?}");
+    taken
+}
+
+/// What goes on while the disk hangs, and what is refused at once; `known` is a motion that has ended.
+fn check_on_hanging_disk(http: &Http, known: &str) {
+    look("motion", &|| {
+        drop(http.motion(known, Duration::ZERO).unwrap())
+    });
+    look("status", &|| drop(http.machine()));
+    look("jog", &|| {
+        let jog = json!({"axis": "x", "speed": "1mm/s"});
+        let jog = http.post(&anna(), "/v1/jog", "", &jog);
+        assert_eq!(jog.status, 200, "{jog:?}");
+    });
+    http.stop(&anna(), StopMode::Quick).unwrap();
+    look("disable", &|| http.power(&anna(), "x", false).unwrap());
+    look("lease", &|| {
+        let lease = http.post(
+            &anna(),
+            "/v1/lease",
+            "",
+            &json!({"name": "anna", "seconds": 9}),
+        );
+        assert_eq!(lease.status, 200, "{lease:?}");
+        let token = lease.json()["token"].as_str().map(str::to_owned);
+        let holder = Caller {
+            lease: token,
+            ..anna()
+        };
+        http.release(&holder).unwrap();
+    });
+    for (path, body) in [
+        ("/v1/motions", to(2.0)),
+        ("/v1/runs", json!({"kind": "zero"})),
+    ] {
+        look(path, &|| {
+            let refused = http.post(&anna(), path, "", &body);
+            assert_eq!(refused.status, 503, "{refused:?}");
+            assert!(refused.json()["cause"].as_str().unwrap().contains("hangs"));
+        });
+    }
+}
+
 #[test]
 fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
     on_a_disk(|_, http, disk| {
@@ -142,14 +192,6 @@ fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
             (refused.status, &refused.json()["code"]),
             (503, &json!("storage"))
         );
-        let look = |name: &str, ask: &dyn Fn()| {
-            let begun = Instant::now();
-            ask();
-            let taken = begun.elapsed();
-            println!("{name}: {:.1} ms", taken.as_secs_f64() * 1e3);
-            assert!(taken < AT_ONCE, "{name} took {taken:?}");
-            taken
-        };
         let mut stops: Vec<_> = (0..9)
             .map(|_| {
                 look("stop", &|| {
@@ -159,42 +201,7 @@ fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
             .collect();
         stops.sort();
         assert!(stops[4] <= STOP_WITHIN, "{stops:?}");
-        look("motion", &|| {
-            drop(http.motion(&known, Duration::ZERO).unwrap())
-        });
-        look("status", &|| drop(http.machine()));
-        look("jog", &|| {
-            let jog = json!({"axis": "x", "speed": "1mm/s"});
-            let jog = http.post(&anna(), "/v1/jog", "", &jog);
-            assert_eq!(jog.status, 200, "{jog:?}");
-        });
-        http.stop(&anna(), StopMode::Quick).unwrap();
-        look("disable", &|| http.power(&anna(), "x", false).unwrap());
-        look("lease", &|| {
-            let lease = http.post(
-                &anna(),
-                "/v1/lease",
-                "",
-                &json!({"name": "anna", "seconds": 9}),
-            );
-            assert_eq!(lease.status, 200, "{lease:?}");
-            let token = lease.json()["token"].as_str().map(str::to_owned);
-            let holder = Caller {
-                lease: token,
-                ..anna()
-            };
-            http.release(&holder).unwrap();
-        });
-        for (path, body) in [
-            ("/v1/motions", to(2.0)),
-            ("/v1/runs", json!({"kind": "zero"})),
-        ] {
-            look(path, &|| {
-                let refused = http.post(&anna(), path, "", &body);
-                assert_eq!(refused.status, 503, "{refused:?}");
-                assert!(refused.json()["cause"].as_str().unwrap().contains("hangs"));
-            });
-        }
+        check_on_hanging_disk(http, &known);
         assert_eq!(health(http)["ok"], false);
         let metrics = http.ask("GET /metrics HTTP/1.1", b"");
         let metrics = String::from_utf8(metrics.body).unwrap();

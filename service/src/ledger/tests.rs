@@ -194,7 +194,7 @@ fn ends_have_the_room_of_the_ballast_and_no_request_has() {
 }
 
 #[test]
-fn what_cannot_be_read_is_kept_and_keys_are_refused_until_that_is_accepted() {
+fn a_damaged_ledger_refuses_keys_until_accepted() {
     let files = SimulatedFiles::new();
     let (ledger, mut writer) = open(&files);
     for key in ["one", "two"] {
@@ -419,7 +419,7 @@ fn cut(files: &SimulatedFiles, how: Cut) {
 
 /// Each call of two lives fails in each way, then the program is killed or the power cut.
 #[test]
-fn whatever_call_fails_nothing_told_is_lost_and_no_key_moves_twice() {
+fn no_failed_call_loses_an_acknowledgement() {
     let calls = {
         let files = SimulatedFiles::new();
         let mut told = Told::default();

@@ -168,8 +168,7 @@ impl Writer {
     }
 
     /// Makes the next [`Writer::write`] try what failed.
-    #[cfg(test)]
-    pub(super) const fn retry_now(&mut self) {
+    pub(crate) const fn retry_now(&mut self) {
         self.tried = None;
     }
 
