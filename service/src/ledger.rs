@@ -203,7 +203,7 @@ impl Ledger {
             }
         }
         self.require_storage()?;
-        let line = asked.line();
+        let line = Line::of_asked(asked);
         let answer = self.write_and_answer(&mut state, asked.id(), &line, asked.key().is_some())?;
         state.memory.ask(Arc::clone(asked), false);
         Ok(Begun::Writing(answer))
@@ -270,7 +270,7 @@ impl Ledger {
         let mut state = self.state();
         let id = end.id().to_owned();
         if let Some(end) = state.memory.end(Arc::new(end)) {
-            let line = end.line();
+            let line = Line::of_end(&end);
             self.push(&mut state, &line, ItemOf::End(end));
         }
         state.memory.entry(&id).map(|entry| entry.is_kept)

@@ -74,6 +74,9 @@ fn keep_ledger(desk: &Desk, mut writer: Writer, over: &AtomicBool) {
     loop {
         let is_last = over.load(Ordering::Acquire);
         desk.note_ends();
+        if is_last {
+            writer.retry_now();
+        }
         writer.write();
         if is_last {
             return;
@@ -88,8 +91,11 @@ fn keep_journal(desk: &Desk, folder: &Path, over: &AtomicBool) {
     loop {
         let is_last = over.load(Ordering::Acquire);
         log.iter_mut().for_each(|log| log.tell(desk));
-        // A disk that is full or gone must not end the service; the next look tries again.
-        let _ = write_events(desk, folder, &mut newest);
+        // On a full disk ends come first: events would take the room that the ballast leaves them.
+        if desk.storage().ok {
+            // A disk that is gone must not end the service; the next look tries again.
+            let _ = write_events(desk, folder, &mut newest);
+        }
         if is_last {
             return;
         }
@@ -107,7 +113,11 @@ fn write_events(desk: &Desk, folder: &Path, newest: &mut u64) -> io::Result<()> 
         serde_json::to_writer(&mut bytes, event)?;
         bytes.push(b'\n');
     }
-    journal(folder)?.write_all(&bytes)?;
+    let mut file = journal(folder)?;
+    let length = file.metadata()?.len();
+    // The next try would stand behind half a line.
+    let written = file.write_all(&bytes);
+    written.or_else(|error| file.set_len(length).and(Err(error)))?;
     *newest = last;
     Ok(())
 }

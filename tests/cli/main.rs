@@ -33,6 +33,7 @@ mod screw;
 mod serve;
 mod serve_kinds;
 mod signals;
+mod slow_disk;
 mod soak;
 mod table;
 mod tutorial;

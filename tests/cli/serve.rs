@@ -20,11 +20,22 @@ pub(crate) fn ask(folder: &Path, request: &str, body: &Value) -> (u16, Value) {
 
 /// The status of an answer, and its body as it is.
 pub(crate) fn fetch(folder: &Path, request: &str, body: &Value) -> (u16, String) {
+    fetch_with(folder, request, "", body)
+}
+
+/// The same with more `headers`, each with the end of its line.
+pub(crate) fn fetch_with(
+    folder: &Path,
+    request: &str,
+    headers: &str,
+    body: &Value,
+) -> (u16, String) {
     let mut stream = UnixStream::connect(folder.join(SOCKET)).expect("it listens");
     let body = body.to_string();
     let length = body.len();
-    let head =
-        format!("{request} HTTP/1.1\r\nhost: x\r\nconnection: close\r\ncontent-length: {length}");
+    let head = format!(
+        "{request} HTTP/1.1\r\n{headers}host: x\r\nconnection: close\r\ncontent-length: {length}"
+    );
     stream
         .write_all(format!("{head}\r\n\r\n{body}").as_bytes())
         .expect("it hears");

@@ -52,9 +52,8 @@ impl Disk {
             .0
             .changed
             .wait_timeout_while(self.state(), PATIENCE, |state| state.hanging == 0);
-        let (state, waited) = waited.unwrap_or_else(PoisonError::into_inner);
-        drop(state);
-        assert!(!waited.timed_out(), "nothing writes");
+        let timed_out = waited.unwrap_or_else(PoisonError::into_inner).1.timed_out();
+        assert!(!timed_out, "nobody writes");
     }
 
     /// No byte more has room.

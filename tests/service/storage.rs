@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use service::{Caller, MotionState, RunKind, RunRequest, StopMode};
+use service::{Caller, MotionState, RunKind, RunRequest, RunState, StopMode};
 use tests::{Edit, LINEAR};
 
 use crate::client::{Client, PATIENCE};
@@ -77,27 +77,35 @@ fn await_health(http: &Http) {
     }
 }
 
+/// What `ask` hears where a stop arrives while its request waits for the disk.
+fn stopped_while_it_waits<T: Send>(http: &Http, disk: &Disk, ask: &(dyn Fn() -> T + Sync)) -> T {
+    disk.hang();
+    thread::scope(|scope| {
+        let asking = scope.spawn(ask);
+        disk.await_hanging();
+        let stopped = http.stop(&Caller::named("bert"), StopMode::Controlled);
+        disk.go_on();
+        stopped.unwrap();
+        asking.join().expect("it hears")
+    })
+}
+
 #[test]
 fn a_stop_voids_what_waits_for_the_disk() {
     on_a_disk(|stage, http, disk| {
-        disk.hang();
-        let zero = RunRequest::of(RunKind::Zero, None);
-        let (motion, run) = thread::scope(|scope| {
-            let motion = scope.spawn(|| begin(http, &to(10.0), Some("motion")));
-            let run = scope.spawn(|| http.plan_once(&anna(), &zero, Some("run")));
-            disk.await_hanging();
-            http.stop(&Caller::named("bert"), StopMode::Controlled)
-                .unwrap();
-            disk.go_on();
-            (motion.join().unwrap(), run.join().unwrap())
-        });
+        let motion = stopped_while_it_waits(http, disk, &|| begin(http, &to(10.0), Some("motion")));
         assert_eq!(motion.status, 201, "{motion:?}");
         let motion = motion.json();
         assert_eq!(motion["state"], "stopped", "{motion}");
-        let by = motion["stopped"]["by"].as_str().expect("a name");
+        let by = motion["stopped"]["by"].as_str().unwrap();
         assert!(by.starts_with("bert"), "{motion}");
-        let run = http.run(&run.unwrap(), PATIENCE).unwrap();
-        assert!(run.stopped.unwrap().by.starts_with("bert"));
+        let zero = RunRequest::of(RunKind::Zero, None);
+        let run = stopped_while_it_waits(http, disk, &|| {
+            http.plan_once(&anna(), &zero, Some("run")).unwrap()
+        });
+        let run = http.run(&run, PATIENCE).unwrap();
+        assert_eq!((run.state, run.kept), (RunState::Stopped, Some(true)));
+        assert_eq!(run.stopped.unwrap().by, "bert");
         // It ended so for good: the same request is the same motion.
         let again = begin(http, &to(10.0), Some("motion"));
         assert_eq!((again.status, &again.json()["id"]), (200, &motion["id"]));
@@ -120,6 +128,56 @@ fn a_stop_voids_what_waits_for_the_disk() {
     });
 }
 
+/// How long `ask` takes, which waits for no disk.
+fn look(name: &str, ask: &dyn Fn()) -> Duration {
+    let begun = Instant::now();
+    ask();
+    let taken = begun.elapsed();
+    println!("{name}: {:.1} ms", taken.as_secs_f64() * 1e3);
+    assert!(taken < AT_ONCE, "{name} took {taken:?}");
+    taken
+}
+
+/// What goes on while the disk hangs, and what is refused at once; `known` is a motion that has ended.
+fn check_on_hanging_disk(http: &Http, known: &str) {
+    look("motion", &|| {
+        drop(http.motion(known, Duration::ZERO).unwrap())
+    });
+    look("status", &|| drop(http.machine()));
+    look("jog", &|| {
+        let jog = json!({"axis": "x", "speed": "1mm/s"});
+        let jog = http.post(&anna(), "/v1/jog", "", &jog);
+        assert_eq!(jog.status, 200, "{jog:?}");
+    });
+    http.stop(&anna(), StopMode::Quick).unwrap();
+    look("disable", &|| http.power(&anna(), "x", false).unwrap());
+    look("lease", &|| {
+        let lease = http.post(
+            &anna(),
+            "/v1/lease",
+            "",
+            &json!({"name": "anna", "seconds": 9}),
+        );
+        assert_eq!(lease.status, 200, "{lease:?}");
+        let token = lease.json()["token"].as_str().map(str::to_owned);
+        let holder = Caller {
+            lease: token,
+            ..anna()
+        };
+        http.release(&holder).unwrap();
+    });
+    for (path, body) in [
+        ("/v1/motions", to(2.0)),
+        ("/v1/runs", json!({"kind": "zero"})),
+    ] {
+        look(path, &|| {
+            let refused = http.post(&anna(), path, "", &body);
+            assert_eq!(refused.status, 503, "{refused:?}");
+            assert!(refused.json()["cause"].as_str().unwrap().contains("hangs"));
+        });
+    }
+}
+
 #[test]
 fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
     on_a_disk(|_, http, disk| {
@@ -134,14 +192,6 @@ fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
             (refused.status, &refused.json()["code"]),
             (503, &json!("storage"))
         );
-        let look = |name: &str, ask: &dyn Fn()| {
-            let begun = Instant::now();
-            ask();
-            let taken = begun.elapsed();
-            println!("{name}: {:.1} ms", taken.as_secs_f64() * 1e3);
-            assert!(taken < AT_ONCE, "{name} took {taken:?}");
-            taken
-        };
         let mut stops: Vec<_> = (0..9)
             .map(|_| {
                 look("stop", &|| {
@@ -151,42 +201,7 @@ fn a_disk_that_hangs_keeps_motions_waiting_and_nothing_else() {
             .collect();
         stops.sort();
         assert!(stops[4] <= STOP_WITHIN, "{stops:?}");
-        look("motion", &|| {
-            drop(http.motion(&known, Duration::ZERO).unwrap())
-        });
-        look("status", &|| drop(http.machine()));
-        look("jog", &|| {
-            let jog = json!({"axis": "x", "speed": "1mm/s"});
-            let jog = http.post(&anna(), "/v1/jog", "", &jog);
-            assert_eq!(jog.status, 200, "{jog:?}");
-        });
-        http.stop(&anna(), StopMode::Quick).unwrap();
-        look("disable", &|| http.power(&anna(), "x", false).unwrap());
-        look("lease", &|| {
-            let lease = http.post(
-                &anna(),
-                "/v1/lease",
-                "",
-                &json!({"name": "anna", "seconds": 9}),
-            );
-            assert_eq!(lease.status, 200, "{lease:?}");
-            let token = lease.json()["token"].as_str().map(str::to_owned);
-            let holder = Caller {
-                lease: token,
-                ..anna()
-            };
-            http.release(&holder).unwrap();
-        });
-        for (path, body) in [
-            ("/v1/motions", to(2.0)),
-            ("/v1/runs", json!({"kind": "zero"})),
-        ] {
-            look(path, &|| {
-                let refused = http.post(&anna(), path, "", &body);
-                assert_eq!(refused.status, 503, "{refused:?}");
-                assert!(refused.json()["cause"].as_str().unwrap().contains("hangs"));
-            });
-        }
+        check_on_hanging_disk(http, &known);
         assert_eq!(health(http)["ok"], false);
         let metrics = http.ask("GET /metrics HTTP/1.1", b"");
         let metrics = String::from_utf8(metrics.body).unwrap();

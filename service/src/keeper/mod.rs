@@ -272,9 +272,10 @@ impl Keeper {
 
     /// After a reset: nothing is known of where things are.
     pub(crate) fn recovered(&mut self, machine: &Machine) {
-        // What was asked for before the failure does not begin after it.
-        self.stops.void_all(stopped_by("a reset"));
-        self.fault = None;
+        if self.fault.take().is_some() {
+            // What was asked for before the failure does not begin after it.
+            self.stops.void_all(stopped_by("a reset"));
+        }
         for seat in &mut self.seats {
             seat.task = seat::Task::Free;
             seat.standing_since = None;

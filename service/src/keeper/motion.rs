@@ -24,7 +24,7 @@ use super::seat::{Seat, Task};
 use super::stop::{cause_of, stopped_by};
 use crate::coordinate::Coordinate;
 use crate::problem::{Code, Problem};
-use crate::request::JogRequest;
+use crate::request::{JogRequest, MoveRequest};
 use crate::view::{Cause, MotionState, MotionView, Stopped};
 
 /// So many that have ended are kept in the snapshot.
@@ -443,6 +443,22 @@ impl Keeper {
             }
         }
         self.keep_end(view);
+    }
+
+    /// The motion `id`, which arrived before a stop, ends as stopped and begins nothing.
+    pub(super) fn void_motion(
+        &mut self,
+        machine: &Machine,
+        (id, by): (&str, &str),
+        request: &MoveRequest,
+        stopped: Stopped,
+    ) -> Result<(), Problem> {
+        let motion = self.motion_of(machine.now(), id, by, request)?;
+        let parts = (self.seats.as_slice(), self.groups.as_slice());
+        let end = End::Stopped(stopped);
+        let view = shown::ended(&motion, parts, machine, self.teller.as_ref(), end);
+        self.keep_end(Arc::new(view));
+        Ok(())
     }
 
     /// Shows an end, and tells it.

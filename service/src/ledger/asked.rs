@@ -6,7 +6,6 @@ use std::sync::Arc;
 use ring::digest;
 use serde::{Deserialize, Serialize};
 
-use super::lines::Line;
 use crate::keeper::utc_now;
 use crate::problem::Code;
 use crate::request::{MoveRequest, RunKind, RunRequest};
@@ -155,13 +154,6 @@ impl Asked {
             (Self::Motion(_), Self::Run(_)) | (Self::Run(_), Self::Motion(_)) => false,
         }
     }
-
-    pub(super) fn line(&self) -> Line {
-        match self {
-            Self::Motion(motion) => Line::Asked(motion.clone()),
-            Self::Run(run) => Line::AskedRun(run.clone()),
-        }
-    }
 }
 
 impl End {
@@ -180,13 +172,6 @@ impl End {
                 (own.state, own.begun) == (other.state, other.begun)
             }
             (Self::Motion(_), Self::Run(_)) | (Self::Run(_), Self::Motion(_)) => false,
-        }
-    }
-
-    pub(super) fn line(&self) -> Line {
-        match self {
-            Self::Motion(view) => Line::Ended(Box::new(MotionView::clone(view))),
-            Self::Run(view) => Line::EndedRun(Box::new(lasting(view))),
         }
     }
 }

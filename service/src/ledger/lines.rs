@@ -5,7 +5,7 @@
 use machine::records::{opened, sealed};
 use serde::{Deserialize, Serialize};
 
-use super::asked::{AskedMotion, AskedRun};
+use super::asked::{Asked, AskedMotion, AskedRun, End, lasting};
 use crate::view::{MotionView, RunView};
 
 /// A record of the file.
@@ -46,6 +46,20 @@ const BEGINNINGS: [&str; 9] = [
 ];
 
 impl Line {
+    pub(super) fn of_asked(asked: &Asked) -> Self {
+        match asked {
+            Asked::Motion(motion) => Self::Asked(motion.clone()),
+            Asked::Run(run) => Self::AskedRun(run.clone()),
+        }
+    }
+
+    pub(super) fn of_end(end: &End) -> Self {
+        match end {
+            End::Motion(view) => Self::Ended(Box::new(MotionView::clone(view))),
+            End::Run(view) => Self::EndedRun(Box::new(lasting(view))),
+        }
+    }
+
     /// The line as it is written.
     pub(super) fn sealed(&self) -> String {
         // Maps have keys of text, and nothing else here can fail.

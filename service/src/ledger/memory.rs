@@ -25,7 +25,7 @@ pub(super) struct Entry {
     /// Whether its end is on the disk.
     pub(super) is_kept: bool,
     /// Where it stands in the order of requests.
-    number: u64,
+    pub(super) number: u64,
 }
 
 /// What a request with a key is.
@@ -183,11 +183,9 @@ impl Memory {
         }
     }
 
-    /// All that a new file has to say, in the order of requests.
+    /// All that a new file has to say, in no order.
     pub(super) fn entries(&self) -> Vec<Entry> {
-        let mut entries: Vec<_> = self.entries.values().cloned().collect();
-        entries.sort_unstable_by_key(|entry| entry.number);
-        entries
+        self.entries.values().cloned().collect()
     }
 
     /// The motion `id`, when it was asked for.

@@ -168,8 +168,7 @@ impl Writer {
     }
 
     /// Makes the next [`Writer::write`] try what failed.
-    #[cfg(test)]
-    pub(super) const fn retry_now(&mut self) {
+    pub(crate) const fn retry_now(&mut self) {
         self.tried = None;
     }
 
@@ -207,7 +206,7 @@ impl Writer {
             })?;
             self.damaged = None;
         }
-        let (entries, damaged) = {
+        let (mut entries, damaged) = {
             let mut state = self.ledger.state();
             let left: Vec<_> = state.pending.drain(..).collect();
             let cause = self
@@ -217,6 +216,7 @@ impl Writer {
             refuse_notes(&mut state, left, cause);
             (state.memory.entries(), state.memory.damaged.clone())
         };
+        entries.sort_unstable_by_key(|entry| entry.number);
         let mut text = Line::Boot(self.ledger.boot).sealed();
         let mut add = |line: &Line| {
             // To write into a text cannot fail.
@@ -226,8 +226,8 @@ impl Writer {
             .into_iter()
             .for_each(|name| add(&Line::Damaged(name)));
         for entry in &entries {
-            add(&entry.asked.line());
-            entry.end.iter().for_each(|end| add(&end.line()));
+            add(&Line::of_asked(&entry.asked));
+            entry.end.iter().for_each(|end| add(&Line::of_end(end)));
         }
         self.file.replace(text.as_bytes())?;
         let mut state = self.ledger.state();

@@ -1,7 +1,6 @@
 //! Which motions are accepted, and what they become.
 
 use core::time::Duration;
-use std::sync::Arc;
 
 use machine::Machine;
 use serde_json::json;
@@ -13,10 +12,9 @@ use super::super::seat::Task;
 use super::super::stop::stopped_by;
 use super::super::{Keeper, utc_now};
 use super::going::{Going, Wanted};
-use super::{End, Leg, LegPhase, Motion, Phase, shown};
+use super::{End, Leg, LegPhase, Motion, Phase};
 use crate::problem::{Code, Problem};
 use crate::request::{IfMoving, MoveRequest};
-use crate::view::Stopped;
 
 /// So many may wait or be under way.
 const ACTIVE_MAX: usize = 64;
@@ -38,22 +36,6 @@ impl Keeper {
         self.plan_legs(machine, &mut motion)?;
         self.clear_the_way(machine, &motion, request.if_moving)?;
         self.queue(motion);
-        Ok(())
-    }
-
-    /// The motion `id`, which arrived before a stop, ends as stopped and begins nothing.
-    pub(in super::super) fn void_motion(
-        &mut self,
-        machine: &Machine,
-        (id, by): (&str, &str),
-        request: &MoveRequest,
-        stopped: Stopped,
-    ) -> Result<(), Problem> {
-        let motion = self.motion_of(machine.now(), id, by, request)?;
-        let parts = (self.seats.as_slice(), self.groups.as_slice());
-        let end = End::Stopped(stopped);
-        let view = shown::ended(&motion, parts, machine, self.teller.as_ref(), end);
-        self.keep_end(Arc::new(view));
         Ok(())
     }
 
