@@ -9,8 +9,9 @@ use drivers::device::Place;
 use units::{LengthOrAngle, Metres, Radians, Time};
 
 use crate::machine::Machine;
-use crate::stopping::COAST_LIMIT;
 
+/// How long an axis that cannot be braked is watched until it stands.
+pub(crate) const COAST_LIMIT: Duration = Duration::from_secs(10);
 /// A drive that was heard before says where its axis is within this time.
 const SILENT_MAX: Duration = Duration::from_secs(1);
 /// A speed is that over so much of time.

@@ -7,7 +7,7 @@ use compensator::apply::ApproachTracker;
 use drivers::device::DriveCommand;
 
 use crate::cause_search::{CauseSearch, diagnose};
-use crate::coasting::await_rest;
+use crate::coasting::{COAST_LIMIT, await_rest};
 use crate::diagnosis::is_wait;
 use crate::failure::{Failure, Layered};
 use crate::kept_zero;
@@ -17,8 +17,6 @@ use crate::waiting::Watched;
 
 /// The longest a stop may take before the next drive is tried.
 pub const STOP_LIMIT: Duration = Duration::from_secs(2);
-/// How long an axis that cannot be braked is watched until it stands.
-pub(crate) const COAST_LIMIT: Duration = Duration::from_secs(10);
 /// The longest that the whole of [`Machine::make_safe`] takes, with a second for the search of a cause. A second
 /// request to stop counts for nothing before.
 pub const LONGEST_STOP: Duration = Duration::from_secs(15);

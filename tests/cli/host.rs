@@ -1,18 +1,23 @@
 //! What a computer does to a program that owns a machine: blocked output, limits, files that are full.
 
+use core::time::Duration;
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::fd::{AsFd, OwnedFd};
 use std::process::{Command, Stdio};
+use std::thread;
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::pty::openpty;
 use nix::sys::signal::Signal;
 use nix::sys::termios::{FlowArg, tcflow};
 use nix::unistd::pipe;
-use tests::Rig;
+use serde_json::{Value, json};
+use tests::{Edit, ROTARY, Rig};
 
+use crate::killed::Watcher;
 use crate::programs::{Bench, Process, live_rigs, text};
+use crate::serve::{ask, keep};
 use crate::signals::Table;
 
 const JOG: [&str; 3] = ["jog", "machine.toml", "c=20deg/s"];
@@ -113,7 +118,7 @@ fn a_reader_that_comes_back_reads_what_was_blocked() {
     // The pipe ends with whoever has its other end.
     drop(command);
     let mut said = String::new();
-    let ended = std::thread::spawn(move || process.end().code);
+    let ended = thread::spawn(move || process.end().code);
     let read = File::from(unread).read_to_string(&mut said);
     assert!(read.is_ok(), "{said}");
     assert_eq!(ended.join().ok(), Some(Some(0)));
@@ -211,8 +216,7 @@ fn a_run_that_a_device_ends_names_its_journal() {
             journals.any(|entry| entry.metadata().is_ok_and(|data| data.len() > 8_000))
         };
         process.wait_until(is_measuring);
-        crate::killed::Watcher::of(&bench)
-            .lend_hand("fault fault = { kind = \"safe_torque_off\" }");
+        Watcher::of(&bench).lend_hand("fault fault = { kind = \"safe_torque_off\" }");
         let ended = process.end();
         assert!(ended.said.contains("--resume"), "{ended:?}");
         let failed = ended.with_code(4);
@@ -221,4 +225,82 @@ fn a_run_that_a_device_ends_names_its_journal() {
         assert!(text(&failed["journal"]).contains("-calibrate-"), "{failed}");
         assert!(failed["code"].is_string(), "{failed}");
     }
+}
+
+/// A service whose table is on its way, and the path of that motion.
+fn turning() -> (Process, String, Table) {
+    let bench = Bench::of(Rig::Pty, ROTARY, |text| text);
+    bench.configure("machine.toml", |text| {
+        text.edit("move_timeout_s = 60.0", "move_timeout_s = 100000.0")
+    });
+    let service = keep(&bench);
+    bench.run(&["zero", "machine.toml"]).with_code(0);
+    let mut table = Table::held(bench);
+    let body = json!({"targets": {"c": "170deg"}, "speed": "20deg/s", "uncompensated": true});
+    let folder = table.bench.folder().to_owned();
+    let asked = thread::spawn(move || ask(&folder, "POST /v1/motions", &body));
+    while !asked.is_finished() {
+        table.watcher.wait(Duration::from_millis(5));
+    }
+    let (status, motion) = asked.join().expect("it is answered");
+    assert_eq!(status, 201, "{motion}");
+    let path = format!("GET /v1/motions/{}", text(&motion["id"]));
+    (service, path, table)
+}
+
+fn look(bench: &Bench, request: &str) -> Value {
+    loop {
+        let (status, seen) = ask(bench.folder(), request, &Value::Null);
+        // On a busy computer time stands still for long, and it is asked too often.
+        if status != 429 {
+            assert_eq!(status, 200, "{seen}");
+            return seen;
+        }
+    }
+}
+
+/// Its drive has no torque, and says so at once.
+#[test]
+fn a_motion_fails_when_its_table_stands() {
+    let (_service, motion, mut table) = turning();
+    table.watcher.wait(Duration::from_secs(3));
+    table
+        .watcher
+        .lend_hand("fault fault = { kind = \"safe_torque_off\" }");
+    let opened = table.angle_deg();
+    let mut seen = Vec::new();
+    let ended = loop {
+        let state = look(&table.bench, &motion)["state"].clone();
+        if state == "failed" {
+            break table.angle_deg();
+        }
+        if seen.last() != Some(&state) {
+            seen.push(state);
+        }
+        table.watcher.wait(Duration::from_millis(5));
+    };
+    table.watcher.wait(Duration::from_secs(1));
+    let turned = (table.angle_deg() - ended).abs();
+    assert!((ended - opened).abs() > 2.0, "{opened} to {ended} degrees");
+    assert!(turned < 0.01, "it turned by {turned} degrees");
+    assert_eq!(seen, ["moving", "stopping"]);
+}
+
+/// A computer that froze, or a drive that did: nobody knows where the axis is.
+#[test]
+fn values_of_a_silent_drive_are_unknown() {
+    let (_service, motion, mut table) = turning();
+    table.watcher.wait(Duration::from_secs(3));
+    let before = look(&table.bench, "GET /v1/axes/c");
+    assert!(before["encoder"]["value"].is_f64(), "{before}");
+    table
+        .watcher
+        .lend_hand("fault fault = { kind = \"mute\", node = \"drive\" }");
+    // Its silence has been noticed, and it was asked to stop.
+    table.watcher.wait(Duration::from_millis(1_500));
+    let silent = look(&table.bench, "GET /v1/axes/c");
+    assert_eq!(silent["state"], "ErrorStop", "{silent}");
+    assert!(silent["encoder"].is_null(), "{silent}");
+    assert!(silent["position"].is_null(), "{silent}");
+    assert_eq!(look(&table.bench, &motion)["state"], "stopping");
 }

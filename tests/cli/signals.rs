@@ -26,7 +26,11 @@ pub(crate) struct Table {
 
 impl Table {
     pub(crate) fn new() -> Self {
-        let bench = Bench::of(Rig::Pty, ROTARY, |text| text);
+        Self::held(Bench::of(Rig::Pty, ROTARY, |text| text))
+    }
+
+    /// From now on time passes as the test lets it.
+    pub(crate) fn held(bench: Bench) -> Self {
         let watcher = Watcher::of(&bench);
         Self { bench, watcher }
     }

@@ -206,9 +206,12 @@ fn standard_streams_have_one_writer() {
         "println!(",
         "eprint!(",
         "eprintln!(",
-        "stdout()",
-        "stderr()",
-        "dbg!(",
+        " stdout()",
+        " stderr()",
+        "(stdout()",
+        "(stderr()",
+        "::stdout()",
+        "::stderr()",
     ];
     for folder in [
         "drivers/src",

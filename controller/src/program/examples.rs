@@ -235,8 +235,8 @@ pub(super) const EXIT_CODES: &str = "Exit codes: 0 done, 2 usage or configuratio
      130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP";
 
 /// Of a verb that works until somebody ends it: that is how it ends well.
-const EXIT_CODES_OF_SERVICE: &str = "Exit codes: 0 done, which is also an end by Ctrl-C, SIGTERM or SIGHUP (a second one ends it at once: 130, 143,\n\
-     129), 2 usage or configuration, 3 refused for safety, 4 device or bus";
+const EXIT_CODES_OF_SERVICE: &str = "Exit codes: 0 done, which is also an end by Ctrl-C, SIGTERM or SIGHUP (one that comes 15 s later or more ends it at once:\n\
+     130, 143, 129), 2 usage or configuration, 3 refused for safety, 4 device or bus";
 
 /// `command` with examples and exit codes in the help of each of its verbs.
 pub(super) fn with_examples(command: Command) -> Command {

@@ -23,6 +23,7 @@ mod latch;
 mod name;
 pub mod nd287;
 mod plausible;
+mod reading;
 mod reference;
 pub mod serial_line;
 mod shared_line;
@@ -31,8 +32,7 @@ pub mod umd2;
 use core::time::Duration;
 
 use units::{
-    Approach, Celsius, Coordinate, Counts, LengthOrAngle, Metres, Pascals, Radians,
-    RelativeHumidity, Time, Volts,
+    Approach, Celsius, Coordinate, Metres, Pascals, Radians, RelativeHumidity, Time, Volts,
 };
 use wire::Input;
 use wire::Payload;
@@ -45,6 +45,7 @@ pub use envelope::TRAVEL_MARGIN;
 pub use error::{DeviceError, Seen};
 pub use latch::{LatchCommand, Latched, PositionLatch, Repeat, RotaryAxis, SYNCS_PER_EDGE};
 pub use name::DeviceName;
+pub use reading::{AxisReading, Place};
 pub use reference::{DriveReference, ReferenceLost, ReferenceProof};
 pub use shared_line::{LineUse, Urgency};
 
@@ -153,17 +154,6 @@ pub trait ServoDrive: Device {
     /// that was lost, the moment it was to start, since the motion may be as old. `None`
     /// before the first motion and from a new command until its motion begins.
     fn started_at(&self) -> Option<Time>;
-}
-
-/// One sample of an axis, whatever it moves in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// When it arrived.
-    pub at: Time,
-    /// The encoder, drive coordinates.
-    pub position: LengthOrAngle,
-    /// Whether the last samples lie together, wherever that is.
-    pub stands: bool,
 }
 
 /// What every drive can be told, whatever it moves.
@@ -280,23 +270,6 @@ impl<Q: Coordinate> From<DriveCommand> for AxisCommand<Q> {
     fn from(command: DriveCommand) -> Self {
         Self::Drive(command)
     }
-}
-
-/// One sample of an axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisReading<Q: Coordinate = Metres> {
-    /// When it arrived.
-    pub at: Time,
-    /// The encoder, as the drive counts.
-    pub counts: Counts,
-    /// The same in metres or radians, drive coordinates.
-    pub position: Q,
-    /// The drive's own following error, where it is mapped.
-    pub following_error: Option<Q>,
-    /// Whether the drive reports its target reached and no motion pending.
-    pub standing: bool,
-    /// Whether the last samples lie together: it does not move, whatever the drive says.
-    pub at_rest: bool,
 }
 
 /// Voltages that are read together.

@@ -141,7 +141,10 @@ fn require_alone(path: &str) -> Result<File, SerialError> {
         .custom_flags(flags.bits())
         .open(path);
     let file = opened.map_err(|source| SerialError {
-        help: help_for(path),
+        help: match source.raw_os_error().map(Errno::from_raw) {
+            Some(Errno::EMFILE | Errno::ENFILE) => "allow more open files (`ulimit -n`)",
+            _ => help_for(path),
+        },
         source,
     })?;
     let in_use = |errno: Errno| SerialError {

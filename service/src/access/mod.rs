@@ -104,7 +104,7 @@ impl Access {
 
     /// The same, which says by `say` what is wrong with its files. `say` must not wait.
     #[must_use]
-    pub fn saying(mut self, say: Say) -> Self {
+    pub fn saying(mut self, say: Arc<dyn Fn(&str) + Send + Sync>) -> Self {
         self.say = Some(say);
         self
     }

@@ -238,7 +238,7 @@ impl Keeper {
     /// Everything that was under way fails with `cause` when the machine has been made safe.
     pub(crate) fn begin_fault(&mut self, failure: &truestage::Failure) {
         let cause = Arc::new(cause_of(failure));
-        self.motions.is_about(match failure {
+        self.motions.begin_fault(match failure {
             truestage::Failure::Machine(failure) => failure.device(),
             _ => None,
         });

@@ -141,6 +141,8 @@ pub(super) struct Motions {
     ended: VecDeque<Arc<MotionView>>,
     /// The device that the fault is about which ends them all.
     about: Option<String>,
+    /// Such a fault stops their axes now.
+    is_faulted: bool,
     /// Who has not let go of a jog that was ended.
     held_back: Vec<HeldBack>,
     /// Jogs that gave way to others of their callers.
@@ -149,9 +151,11 @@ pub(super) struct Motions {
 }
 
 impl Motions {
-    /// The fault that ends them all is about `device`.
-    pub(super) fn is_about(&mut self, device: Option<&str>) {
+    /// A fault ends them all once their axes stand; it is about `device`.
+    pub(super) fn begin_fault(&mut self, device: Option<&str>) {
         self.about = device.map(str::to_owned);
+        self.is_faulted = true;
+        self.published = None;
     }
 
     /// Whether the procedure that runs is one of theirs, and has to end.
@@ -169,7 +173,13 @@ impl Motions {
     pub(super) fn list(&mut self, seats: &[Seat]) -> Arc<Vec<Arc<MotionView>>> {
         let (active, ended) = (&self.active, &self.ended);
         let list = self.published.get_or_insert_with(|| {
-            let shown = active.iter().map(|it| Arc::new(shown::view(it, seats)));
+            let shown = active.iter().map(|motion| {
+                let mut view = shown::view(motion, seats);
+                if self.is_faulted && view.state == MotionState::Moving {
+                    view.state = MotionState::Stopping;
+                }
+                Arc::new(view)
+            });
             Arc::new(ended.iter().cloned().chain(shown).collect())
         });
         Arc::clone(list)
@@ -401,6 +411,7 @@ impl Keeper {
             };
             self.finish_motion(machine, 0, end);
         }
+        self.motions.is_faulted = false;
     }
 
     /// The final positions are published, and then the end.

@@ -17,6 +17,9 @@ use crate::request::RunKind;
 use crate::snapshot::{AxisSample, CalibrationInUse};
 use crate::view::{AxisState, Cause};
 
+/// The age of a sample that still says where an axis is: amplifiers that share a serial line are asked in turn.
+const KNOWN_FOR: Duration = Duration::from_secs(1);
+
 /// What an axis is in use for.
 #[derive(Debug)]
 pub(super) enum Task {
@@ -166,7 +169,9 @@ impl Seat {
     /// What is published of it.
     pub(super) fn sample(&self, machine: &Machine) -> AxisSample {
         let sampled = self.mechanics.sampled(machine, &self.name);
-        let encoder = sampled.map(|it| it.position);
+        // After a freeze of this computer, or of its drive, nobody knows where it is.
+        let known = sampled.filter(|sampled| machine.now().since(sampled.at) <= KNOWN_FOR);
+        let encoder = known.map(|sampled| sampled.position);
         let homed = machine.is_zeroed(&self.name);
         let place = encoder.filter(|_| homed).and_then(|it| {
             self.mechanics

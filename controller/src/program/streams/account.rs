@@ -256,10 +256,6 @@ mod tests {
             "  at 8 s: run volume, 5 s left",
         ];
         assert_eq!(said(&mut it, 3.5, 8.0), expected);
-        assert_eq!(
-            it.take(Sign::Said("warning: x".into())).unwrap(),
-            "warning: x"
-        );
     }
 
     #[test]

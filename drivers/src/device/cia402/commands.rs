@@ -64,12 +64,8 @@ impl<Q: Coordinate> ServoDrive for Cia402Drive<Q> {
     }
 
     fn place(&self) -> Option<Place> {
-        let sample = self.image.sample()?;
-        Some(Place {
-            at: sample.at,
-            position: self.settings.scale.to_coordinate(sample.position).into(),
-            stands: self.image.plausible.stands(),
-        })
+        let stands = self.image.plausible.stands();
+        self.reading().map(|reading| reading.place(stands))
     }
 
     fn was_enabled(&self) -> bool {

@@ -407,13 +407,8 @@ impl<Q: Coordinate> ServoDrive for CopleyAxis<Q> {
     }
 
     fn place(&self) -> Option<Place> {
-        let (at, position) = self.image.position()?;
-        let counts = position + self.origin;
-        Some(Place {
-            at,
-            position: self.settings.scale.to_coordinate(counts).into(),
-            stands: self.image.plausible.stands(),
-        })
+        let stands = self.image.plausible.stands();
+        self.reading().map(|reading| reading.place(stands))
     }
 
     fn was_enabled(&self) -> bool {
