@@ -86,7 +86,11 @@ fn a_page_shows_silence_and_whether_a_stop_was_taken() {
     let programs = programs();
     let words = [&*programs.to_string_lossy(), BROWSER];
     let report = Peer::start("silence_judge.py", &words).finish();
-    for (name, expected) in [("grey_before", false), ("grey", true), ("grey_after", false)] {
+    for (name, expected) in [
+        ("grey_before", false),
+        ("grey", true),
+        ("grey_after", false),
+    ] {
         assert_eq!(report[name], expected, "{name}: {report}");
     }
     let within = |stop: &Value, word: &str, most_s: f64| {
@@ -106,5 +110,4 @@ fn a_page_shows_silence_and_whether_a_stop_was_taken() {
     for stop in stops {
         within(stop, "taken at ", 2.0);
     }
-
 }

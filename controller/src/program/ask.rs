@@ -24,9 +24,7 @@ pub(crate) fn status(args: &ServiceArgs, output: Output) -> Ended {
 pub(crate) fn stop(args: &ServiceArgs, quick: bool, output: Output) -> Ended {
     let mode = if quick { "quick" } else { "controlled" };
     let body = json!({"mode": mode}).to_string();
-    let answer = urgently(&args.place()?, move |at| {
-        ask(at, "POST", "/v1/stop", &body)
-    })?;
+    let answer = urgently(&args.place()?, move |at| ask(at, "POST", "/v1/stop", &body))?;
     output.result(&format!("a {mode} stop is under way"), &answer)
 }
 

@@ -117,7 +117,10 @@ impl Terminal {
         tcflush(answers, FlushArg::TCIFLUSH).map_err(|errno| gone(&errno.into()))?;
         let drives = match self.is_driven {
             true => DriveState::Off.warning(ENTER),
-            false => "this run has no drives, which is not a safe stop: make the machine safe first".to_owned(),
+            false => {
+                "this run has no drives, which is not a safe stop: make the machine safe first"
+                    .to_owned()
+            }
         };
         self.output.must_say(&format!(
             "  {drives}; press Enter when it is done, Ctrl-C to stop (what was read is kept)"

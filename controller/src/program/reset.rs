@@ -28,16 +28,24 @@ pub(crate) fn meant(names: Vec<String>, args: &AxisArgs) -> Result<Option<String
 
 /// What is told of resets; of one axis that is `meant`, of it alone.
 pub(crate) fn told(meant: Option<&str>, resets: &[AxisReset], zero: &str) -> (String, Value) {
-    let lines = resets.iter().map(|AxisReset { axis, before, after }| {
-        format!("axis {axis}: was in {before}, is now in {after}; {zero}")
-    });
+    let lines = resets.iter().map(
+        |AxisReset {
+             axis,
+             before,
+             after,
+         }| { format!("axis {axis}: was in {before}, is now in {after}; {zero}") },
+    );
     let text = match resets {
         [] => "no axis has a fault; nothing was acknowledged".to_owned(),
         _ => lines.collect::<Vec<_>>().join("\n"),
     };
-    let values = resets.iter().map(|AxisReset { axis, before, after }| {
-        json!({"axis": axis, "before": before, "after": after})
-    });
+    let values = resets.iter().map(
+        |AxisReset {
+             axis,
+             before,
+             after,
+         }| { json!({"axis": axis, "before": before, "after": after}) },
+    );
     let mut values: Vec<Value> = values.collect();
     let value = match meant {
         Some(_) => values.pop().unwrap_or_default(),
@@ -60,10 +68,7 @@ pub(crate) fn run(args: &AxisArgs, output: Output) -> Ended {
             resets.extend(reset(machine, axis, meant.as_deref())?);
         }
         machine.shut_down()?;
-        Ok((
-            resets,
-            to_json::counters(&machine.devices().counters()),
-        ))
+        Ok((resets, to_json::counters(&machine.devices().counters())))
     })?;
     let (text, mut value) = told(meant.as_deref(), &resets, "zero it before it moves");
     value["counters"] = counters;
@@ -76,7 +81,8 @@ fn reset(
     axis: String,
     meant: Option<&str>,
 ) -> Result<Option<AxisReset>, Failure> {
-    let word = |state: Option<PowerState>| state.map_or("unknown".into(), |state| state.to_string());
+    let word =
+        |state: Option<PowerState>| state.map_or("unknown".into(), |state| state.to_string());
     let before = machine.power_state(&axis)?;
     let is_wanted = meant.map_or(before == Some(PowerState::Fault), |meant| meant == axis);
     if !is_wanted {

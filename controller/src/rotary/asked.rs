@@ -15,7 +15,8 @@ pub(crate) struct Asking<'p>(pub(crate) &'p mut dyn Person);
 
 impl Operator for Asking<'_> {
     fn ask(&mut self, task: &PlateTask) -> Result<(), Failure> {
-        let question = Question::of_work(PlateTask::WHAT, task.text(), DriveState::Off, json!(task));
+        let question =
+            Question::of_work(PlateTask::WHAT, task.text(), DriveState::Off, json!(task));
         self.0.ask(question)
     }
 

@@ -52,8 +52,8 @@ pub use head::{
 };
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, JOURNAL_MAX, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_entries,
-    read_journal,
+    AnyLog, ClosureEntry, JOURNAL_MAX, Journal, JournalHeader, Log, ReadJournal, not_resumable,
+    read_entries, read_journal,
 };
 pub use lease::Lease;
 pub use line::{opened, sealed};

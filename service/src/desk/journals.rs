@@ -34,7 +34,8 @@ impl Desk {
     pub fn journal(&self, name: &str) -> Result<String, Problem> {
         let path = self.journal_path(name)?;
         let mut text = String::new();
-        let read = open_regular(&path, JOURNAL_MAX).and_then(|mut file| file.read_to_string(&mut text));
+        let read =
+            open_regular(&path, JOURNAL_MAX).and_then(|mut file| file.read_to_string(&mut text));
         read.map_err(|source| Problem::from(Failure::File { path, source }))?;
         Ok(text)
     }

@@ -60,7 +60,10 @@ fn a_job_is_judged_planned_and_done_with_whoever_is_waited_for() {
             first.text.contains("load: lay a part on the stage"),
             "{first:?}"
         );
-        assert!(first.safety.contains("be out of its way first"), "{first:?}");
+        assert!(
+            first.safety.contains("be out of its way first"),
+            "{first:?}"
+        );
         // It holds its place under power, and nobody else moves it.
         let stands = bed.encoder_mm("x");
         assert!((stands - 5.0).abs() < 0.05, "{stands}");
