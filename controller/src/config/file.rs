@@ -42,7 +42,7 @@ impl ConfigFile {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::config::load;
 
     #[test]
     fn a_file_that_says_something_else_is_noticed() {
@@ -50,7 +50,7 @@ mod tests {
         let path = file.path();
         let text = include_str!("../../../configs/machines/linear.toml");
         std::fs::write(path, text).unwrap();
-        let read = super::super::load(path).unwrap().file.unwrap();
+        let read = load(path).unwrap().file.unwrap();
         assert_eq!(read.change(), None);
         // Written anew with the same text, it says the same.
         std::fs::write(path, text).unwrap();

@@ -307,7 +307,7 @@ fn in_order(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
     }
     found.sort_by_cached_key(|it| {
         let last = last_of.get(&it.key).copied();
-        let last = last.filter(|_| is_missing(&it));
+        let last = last.filter(|_| is_missing(it));
         (
             last.unwrap_or_default().max(it.line),
             last.is_some(),
