@@ -2,6 +2,7 @@
 
 mod along;
 mod calibrations;
+mod config_file;
 mod journals;
 mod runs;
 
@@ -18,7 +19,6 @@ use std::time::Instant;
 use machine::records::Store;
 use tokio::sync::oneshot;
 use truestage::Failure;
-use truestage::config::ConfigFile;
 
 use crate::figures::Figures;
 use crate::keeper::utc_now;
@@ -371,16 +371,6 @@ impl Desk {
     /// When a cause is still there, or something is under way.
     pub fn reset(&self, caller: &Caller) -> Result<(), Problem> {
         self.done(caller, Order::Reset)
-    }
-
-    /// That the machine's file says something else by now, which nobody uses. Reads the disk; it is told among the
-    /// events, too.
-    pub fn config_change(&self, caller: &Caller) -> Option<String> {
-        let file = self.shared.fixed.config_file.as_ref();
-        let text = file.and_then(ConfigFile::change)?;
-        // Where too many orders wait, the answer says it alone.
-        let _ = self.give(caller, Order::Warn { text: text.clone() });
-        Some(text)
     }
 
     /// Switches `axis` on.
