@@ -81,7 +81,7 @@ pub use agreed::Agreed;
 pub use connected::Machine;
 pub use failure::Failure;
 pub use groups::groups;
-pub use run::CalibrateOptions;
+pub use run::{CalibrateOptions, time_of_day};
 
 // The command, whose `main` is this alone; who keeps a machine for others is given to it.
 #[cfg(feature = "program")]

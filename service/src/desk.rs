@@ -2,6 +2,7 @@
 
 mod along;
 mod calibrations;
+mod config_file;
 mod journals;
 mod runs;
 

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use truestage::config::ConfigFile;
 use units::{Metres, Time};
 
 use crate::coordinate::Coordinate;
@@ -23,6 +24,8 @@ pub(crate) struct Fixed {
     pub(crate) axes: Vec<FixedAxis>,
     /// Axes that can move as one.
     pub(crate) groups: Vec<GroupView>,
+    /// The file of its configuration.
+    pub(crate) config_file: Option<ConfigFile>,
 }
 
 /// What never changes of an axis.

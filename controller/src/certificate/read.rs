@@ -14,6 +14,7 @@ use super::table::Certified;
 use super::xml::{BYTES_MAX, parsed};
 use super::{Unfit, result, unfit};
 use crate::config::judge::{Finding, Judge};
+use crate::run::time_of_day;
 
 /// A certificate that a configuration names, where it stands there.
 pub(crate) struct Named<'a> {
@@ -27,9 +28,7 @@ pub(crate) struct Named<'a> {
 
 /// The day by the clock of this computer, UTC.
 pub(crate) fn today() -> Date {
-    jiff::Timestamp::now()
-        .to_zoned(jiff::tz::TimeZone::UTC)
-        .date()
+    time_of_day().to_zoned(jiff::tz::TimeZone::UTC).date()
 }
 
 /// Reads each certificate; paths count from `folder`. What cannot be used is found.

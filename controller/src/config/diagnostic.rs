@@ -33,9 +33,7 @@ impl Diagnostic {
         cause: String,
         help: String,
     ) -> Self {
-        let before = text.get(..span.start).unwrap_or(text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        let (line, column) = LineStarts::of(text).place_of(span.start);
         Self {
             file: file.to_owned(),
             line,
@@ -44,6 +42,30 @@ impl Diagnostic {
             cause,
             help,
         }
+    }
+}
+
+/// Where each line of a text begins: looked up often, and looked for once.
+pub(super) struct LineStarts<'a> {
+    text: &'a str,
+    starts: Vec<usize>,
+}
+
+impl<'a> LineStarts<'a> {
+    pub(super) fn of(text: &'a str) -> Self {
+        let ends = text.match_indices('\n').map(|(at, _)| at + 1);
+        Self {
+            text,
+            starts: core::iter::once(0).chain(ends).collect(),
+        }
+    }
+
+    /// Line and column of the byte at `at`, both counted from 1; of one that is none, those of the end.
+    pub(super) fn place_of(&self, at: usize) -> (usize, usize) {
+        let before = self.text.get(..at).unwrap_or(self.text);
+        let line = self.starts.partition_point(|start| *start <= before.len());
+        let column = before[self.starts[line - 1]..].chars().count() + 1;
+        (line, column)
     }
 }
 

@@ -1,6 +1,8 @@
 //! The lines of a machine's file as somebody sees them, comments included: what the values stand for is judged
 //! elsewhere, by the keys.
 
+use std::collections::HashMap;
+
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
@@ -26,13 +28,13 @@ pub(crate) enum Line<'a> {
 /// Each line of `text` that says something, with its number, counted from 1. Sections and keys stand in lines of
 /// their own, as in every file that ships.
 pub(crate) fn lines(text: &str) -> Vec<(usize, Line<'_>)> {
-    let mut heads = Vec::new();
+    let mut heads = HashMap::new();
     let numbered = text.lines().enumerate();
     let read = numbered.filter_map(|(at, line)| Some((at + 1, read(line, &mut heads)?)));
     read.collect()
 }
 
-fn read<'a>(line: &'a str, heads: &mut Vec<&'a str>) -> Option<Line<'a>> {
+fn read<'a>(line: &'a str, heads: &mut HashMap<&'a str, usize>) -> Option<Line<'a>> {
     let said = said(line);
     if let Some((name, value)) = said.split_once('=') {
         return Some(Line::Key {
@@ -43,8 +45,9 @@ fn read<'a>(line: &'a str, heads: &mut Vec<&'a str>) -> Option<Line<'a>> {
     let is_row = said.contains(',');
     let text = (said.starts_with('[') && said.ends_with(']') && !is_row).then_some(said)?;
     let path = text.trim_start_matches('[').trim_end_matches(']').trim();
-    let before = heads.iter().filter(|it| **it == path).count();
-    heads.push(path);
+    let count = heads.entry(path).or_default();
+    let before = *count;
+    *count += 1;
     let path = match text.starts_with("[[") {
         true => format!("{path}.{before}"),
         false => path.to_owned(),
@@ -101,9 +104,12 @@ pub(super) fn glued(text: &str, file: &str) -> Vec<Diagnostic> {
 fn comments(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let tokens = Source::new(text).lex();
     let comments = tokens.filter(|it| it.kind() == TokenKind::Comment);
+    // Counted on from the comment before.
+    let (mut line, mut counted) = (1, 0);
     comments.filter_map(move |it| {
         let (start, end) = (it.span().start(), it.span().end());
-        let line = text.get(..start)?.matches('\n').count() + 1;
+        line += text.get(counted..start)?.matches('\n').count();
+        counted = start;
         Some((line, text.get(start..end)?))
     })
 }

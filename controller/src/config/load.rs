@@ -1,5 +1,6 @@
 //! Reading a configuration file: syntax, structure, then sense.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use machine::records::ConfigHash;
@@ -10,7 +11,8 @@ use toml::{Table, Value};
 use super::certificates;
 use super::consequences;
 use super::dependence::hash_of;
-use super::diagnostic::{ConfigError, Diagnostic};
+use super::diagnostic::{ConfigError, Diagnostic, LineStarts};
+use super::file::ConfigFile;
 use super::lines;
 use super::model::MachineConfig;
 use super::other_units;
@@ -36,6 +38,8 @@ pub struct Loaded {
     pub hash: ConfigHash,
     /// Of the whole text: what a kept zero depends on.
     pub(crate) text: ConfigHash,
+    /// The file that it was read from, where it was.
+    pub(crate) file: Option<ConfigFile>,
     /// What is doubtful of it, in the order of the file.
     pub warnings: Vec<Diagnostic>,
     /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
@@ -59,6 +63,7 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
     // same calibrations and take the same lease.
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut loaded = parse_at(&text, &path.display().to_string(), Some(folder))?;
+    loaded.file = Some(ConfigFile::of(path, loaded.text.clone()));
     let section = &mut loaded.config.machine;
     section.data_dir = folder.join(&section.data_dir);
     Ok(loaded)
@@ -91,6 +96,9 @@ fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, Con
     if let Some(error) = whole::no_machine(text, file) {
         return Err(error);
     }
+    if let Some(error) = whole::too_many_sections(text, file) {
+        return Err(error);
+    }
     let mut config: MachineConfig = read_by(text, file, schema::inline(), validate)?;
     let mut findings = Vec::new();
     certificate::read(config.certificates_mut(), folder, &mut findings);
@@ -104,6 +112,7 @@ fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, Con
     Ok(Loaded {
         hash: hash_of(&config),
         text: ConfigHash::of_texts(text, &[]),
+        file: None,
         warnings: merged(placed(text, file, at_values(warnings)), glued),
         ended: placed(text, file, at_values(ended)),
         unfilled: lines::unfilled(text, file),
@@ -288,14 +297,17 @@ fn in_order(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
             it.line,
         )
     });
-    let causes: Vec<_> = causes
-        .map(|(section, key, line)| (section.to_owned(), key.clone(), line))
-        .collect();
+    // Of each section, and of each key, the last line that says what is wrong.
+    let mut last_of: HashMap<String, usize> = HashMap::new();
+    for (section, key, line) in causes {
+        for name in [section, key] {
+            let last = last_of.entry(name.to_owned()).or_default();
+            *last = line.max(*last);
+        }
+    }
     found.sort_by_cached_key(|it| {
-        let own = causes
-            .iter()
-            .filter(|(section, key, _)| is_missing(it) && (*section == it.key || *key == it.key));
-        let last = own.map(|it| it.2).max();
+        let last = last_of.get(&it.key).copied();
+        let last = last.filter(|_| is_missing(it));
         (
             last.unwrap_or_default().max(it.line),
             last.is_some(),
@@ -334,10 +346,18 @@ fn placed(
     file: &str,
     findings: impl Iterator<Item = (Finding, Part)>,
 ) -> Vec<Diagnostic> {
-    let places = Places::of(text);
-    let placed = findings.map(|(it, part)| {
-        let span = places.span_of(&it.key, part).unwrap_or(0..0);
-        Diagnostic::at(file, text, &span, &it.key, it.cause, it.help)
+    let (places, lines) = (Places::of(text), LineStarts::of(text));
+    let placed = findings.map(|(finding, part)| {
+        let span = places.span_of(&finding.key, part).unwrap_or(0..0);
+        let (line, column) = lines.place_of(span.start);
+        Diagnostic {
+            file: file.to_owned(),
+            line,
+            column,
+            key: finding.key,
+            cause: finding.cause,
+            help: finding.help,
+        }
     });
     let mut placed: Vec<_> = placed.collect();
     placed.sort_by_key(|it| (it.line, it.column));

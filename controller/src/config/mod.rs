@@ -13,6 +13,7 @@ mod device_warnings;
 mod diagnostic;
 #[cfg(feature = "program")]
 pub(crate) mod explained;
+mod file;
 mod foreign;
 #[cfg(test)]
 mod impossible_tests;
@@ -47,6 +48,7 @@ mod whole;
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;
 pub(crate) use diagnostic::Diagnostic;
+pub use file::ConfigFile;
 pub(crate) use load::filled_in;
 pub use load::{Loaded, load, parse};
 pub use model::MachineConfig;

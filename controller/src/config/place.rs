@@ -40,14 +40,13 @@ fn span_in(mut table: &DeTable<'_>, key: &str, part: Part) -> Option<Range<usize
     // `actuator[0]` is `actuator.0`.
     let mut parts = key.split(['.', '[', ']']).filter(|it| !it.is_empty());
     // `["axis.x"]` is one name with a point in it.
-    if let Some((name, _)) = table
-        .iter()
-        .find(|(name, _)| name.get_ref().contains('.') && name.get_ref() == key)
+    if key.contains('.')
+        && let Some((name, _)) = table.get_key_value(key)
     {
         return Some(name.span());
     }
     while let Some(own) = parts.next() {
-        let exact = table.iter().find(|(name, _)| name.get_ref() == own);
+        let exact = table.get_key_value(own);
         // What is in capitals is told as what it was meant to be.
         let alike = || {
             let mut names = table.iter();

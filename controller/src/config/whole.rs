@@ -121,6 +121,18 @@ pub(super) fn no_machine(text: &str, file: &str) -> Option<ConfigError> {
     (!has("[machine]")).then(|| invalid(file, text, at, &cause, help))
 }
 
+/// So many sections a machine's file has at most: a bus has 127 nodes.
+const SECTIONS_MAX: usize = 4000;
+
+/// That no machine has so many sections: nobody could read all that is found in them.
+pub(super) fn too_many_sections(text: &str, file: &str) -> Option<ConfigError> {
+    let lines = text.lines().map(str::trim_start);
+    let count = lines.filter(|line| line.starts_with('[')).count();
+    let cause = format!("the file has {count} sections; a machine has {SECTIONS_MAX} at most");
+    let help = "give what is connected here, and leave out the rest";
+    (count > SECTIONS_MAX).then(|| invalid(file, text, 0, &cause, help))
+}
+
 fn is_every_second_zero(bytes: &[u8]) -> bool {
     let pairs = || bytes.chunks_exact(2).take(100);
     let count = |at: usize| pairs().filter(|it| it[at] == 0).count();
@@ -154,6 +166,17 @@ mod tests {
         };
         assert_eq!(one.line, line, "{one}");
         assert!(one.cause.contains(says) && !one.help.is_empty(), "{one}");
+    }
+
+    #[test]
+    fn more_sections_than_a_machine_can_have_are_refused_at_once() {
+        let sections = |count| LINEAR.to_owned() + &"[foo]\n".repeat(count);
+        assert!(too_many_sections(&sections(3000), "m.toml").is_none());
+        let said = too_many_sections(&sections(20_000), "m.toml").expect("it is refused");
+        assert!(
+            said.to_string().contains("sections; a machine has 4000"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use core::marker::PhantomData;
 use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Read as _, Write};
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::difference::{Difference, first_difference};
 use super::hash::ConfigHash;
 use super::head::{IdentityRecord, InstrumentRecord};
-use super::line::{opened, sealed};
+use super::line::{json_of, next_line, sealed};
 use super::regular::open_regular;
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
@@ -25,8 +25,6 @@ use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
 
 /// So long a journal may be, in bytes: many times the longest that a run leaves.
 pub const JOURNAL_MAX: u64 = 256 << 20;
-/// So long a line of it.
-const LINE_MAX: u64 = 16 << 20;
 
 /// What a run is: written first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -404,36 +402,16 @@ fn journal_of<L: Log>(
             }
             Err(_) if is_last => torn = true,
             Err(cause) => {
-                return Err(StoreError::Format {
-                    path: path.to_owned(),
-                    line: number,
-                    cause,
-                });
+                return Err(damaged(path, number, &cause));
             }
         }
     }
-    let mut read = read.ok_or_else(|| StoreError::Format {
-        path: path.to_owned(),
-        line: 1,
-        cause: "the header line is missing or incomplete".into(),
-    })?;
+    let missing = "the header line is missing or incomplete";
+    let mut read = read.ok_or_else(|| damaged(path, 1, missing))?;
     read.valid_bytes = valid_bytes;
     read.torn = torn;
     read.blake3 = hash.finalize().to_hex().to_string();
     Ok(read)
-}
-
-/// Reads one line with its end, nothing at the end of the file; whether nothing follows.
-fn next_line(file: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<bool> {
-    line.clear();
-    file.by_ref().take(LINE_MAX).read_until(b'\n', line)?;
-    Ok(file.fill_buf()?.is_empty())
-}
-
-/// The entry of a whole line.
-fn json_of(line: &[u8]) -> Result<String, String> {
-    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
-    opened(text.strip_suffix('\n').ok_or("the line has no end")?)
 }
 
 fn parse_line<E: DeserializeOwned>(json: &str) -> Result<Line<E>, String> {
@@ -508,10 +486,18 @@ fn begin<L: Log>(
 }
 
 fn no_header(path: &Path, line: usize) -> StoreError {
+    damaged(
+        path,
+        line,
+        "the header must be the first line and the only one",
+    )
+}
+
+fn damaged(path: &Path, line: usize, cause: &str) -> StoreError {
     StoreError::Format {
         path: path.to_owned(),
         line,
-        cause: "the header must be the first line and the only one".into(),
+        cause: cause.into(),
     }
 }
 

@@ -1,6 +1,8 @@
 //! A line of a journal: an object of JSON whose last member is the checksum of the rest (JSON Lines, so that any
 //! program that reads these reads a journal).
 
+use std::io::{self, BufRead, Read as _};
+
 /// What stands before the checksum.
 const KEY: &str = "\"crc32\":\"";
 /// How many hexadecimal digits it has.
@@ -49,6 +51,22 @@ fn inside(line: &str) -> Result<(String, &str), String> {
 fn in_front(line: &str) -> Result<(String, &str), String> {
     let (digits, json) = line.split_once(' ').ok_or(NO_CHECKSUM)?;
     Ok((json.to_owned(), digits))
+}
+
+/// So long a line is, in bytes.
+const LINE_MAX: u64 = 16 << 20;
+
+/// Reads one line with its end, nothing at the end of the file; whether nothing follows.
+pub(super) fn next_line(file: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
+    line.clear();
+    file.by_ref().take(LINE_MAX).read_until(b'\n', line)?;
+    Ok(file.fill_buf()?.is_empty())
+}
+
+/// The entry of a whole line.
+pub(super) fn json_of(line: &[u8]) -> Result<String, String> {
+    let text = core::str::from_utf8(line).map_err(|error| error.to_string())?;
+    opened(text.strip_suffix('\n').ok_or("the line has no end")?)
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl Events {
 
 /// The time of day for records, UTC, RFC 3339, to the millisecond. Nothing is decided by it.
 pub(crate) fn utc_now() -> String {
-    let now = jiff::Timestamp::now();
+    let now = truestage::time_of_day();
     now.strftime("%Y-%m-%dT%H:%M:%S.%3fZ").to_string()
 }
 

@@ -12,6 +12,7 @@ use super::checked::Checked;
 use crate::config::MachineConfig;
 use crate::groups;
 use crate::program::intended::ago;
+use crate::time_of_day;
 
 /// Less than this is left: a run may not find room for its journal.
 const ROOM_LEAST: u64 = 1 << 30;
@@ -106,7 +107,7 @@ const RESTORE: &str = "`truestage cal rollback` goes back to the one before, `tr
 
 fn days_since(created: &str) -> Option<i64> {
     let then: Timestamp = created.parse().ok()?;
-    Some((Timestamp::now().as_second() - then.as_second()) / 86_400)
+    Some((time_of_day().as_second() - then.as_second()) / 86_400)
 }
 
 #[cfg(test)]

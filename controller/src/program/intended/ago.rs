@@ -3,13 +3,15 @@
 use jiff::Timestamp;
 use units::Several;
 
+use crate::time_of_day;
+
 const MINUTE_S: i64 = 60;
 const HOUR_S: i64 = 60 * MINUTE_S;
 const DAY_S: i64 = 24 * HOUR_S;
 
 /// `6 days ago`; `None` for what is no time, or has not been yet.
 pub(crate) fn since(then: &str) -> Option<String> {
-    between(then.parse().ok()?, Timestamp::now())
+    between(then.parse().ok()?, time_of_day())
 }
 
 fn between(then: Timestamp, now: Timestamp) -> Option<String> {

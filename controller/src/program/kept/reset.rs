@@ -20,7 +20,10 @@ impl Service {
         let before = self.axis_states()?;
         let names = before.iter().map(|(name, _)| name.clone()).collect();
         let meant = meant(names, args)?;
-        ask_on(&self.at, "POST", "/v1/reset", "{}")?;
+        let answer = ask_on(&self.at, "POST", "/v1/reset", "{}")?;
+        if answer["warning"].is_string() {
+            output.note(&format!("warning: {}", text(&answer["warning"])));
+        }
         let both = before.into_iter().zip(self.axis_states()?);
         let resets = both.map(|((axis, before), (_, after))| AxisReset {
             axis,

@@ -116,28 +116,8 @@ fn machines() -> Vec<Form> {
             [("devices", list(device)), ("matches", truth())],
         )
         .judged(),
-        Form::new(
-            "reset",
-            "a fault that was acknowledged",
-            [
-                ("axis", text()),
-                (
-                    "before",
-                    text()
-                        .about("The drive's state; where a service keeps the machine, the axis's."),
-                ),
-                ("after", text()),
-            ],
-        )
-        .counted(),
     ];
-    let each = list(object([
-        ("axis", text()),
-        ("before", text()),
-        ("after", text()),
-    ]));
-    let all = "the faults that were acknowledged, where no axis is named";
-    forms.push(Form::new("reset", all, [("resets", each)]).counted());
+    forms.extend(resets());
     forms.extend(["zero", "calibrate", "verify", "move", "jog"].map(dry_run));
     let untold = [
         "zero",
@@ -152,6 +132,28 @@ fn machines() -> Vec<Form> {
     let each = list(object([parts::untold()]));
     forms.push(Form::new("move", UNTOLD, [("moves", each)]));
     forms
+}
+
+/// Of the axis that is named, or of each that had a fault.
+fn resets() -> [Form; 2] {
+    let state = "The drive's state; where a service keeps the machine, the axis's.";
+    let reset = || {
+        [
+            ("axis", text()),
+            ("before", text().about(state)),
+            ("after", text()),
+        ]
+    };
+    let each = list(object(reset()));
+    [
+        Form::new("reset", "a fault that was acknowledged", reset()).counted(),
+        Form::new(
+            "reset",
+            "all faults that were acknowledged",
+            [("resets", each)],
+        )
+        .counted(),
+    ]
 }
 
 fn dry_run(verb: &'static str) -> Form {

@@ -509,7 +509,9 @@ document.addEventListener("keydown", (event) => { if (event.key === "Escape" && 
 byId("take").addEventListener("click", () => told(take()));
 byId("take").addEventListener("blur", () => { sure = false; showTake(); });
 byId("give").addEventListener("click", () => told(give()));
-byId("reset").addEventListener("click", () => told(ask("POST", "/v1/reset")));
+byId("reset").addEventListener("click", () => told(ask("POST", "/v1/reset").then(({ warning }) => {
+  if (warning) throw new Error(warning);
+})));
 byId("plan").addEventListener("submit", (event) => {
   event.preventDefault();
   const request = { kind: byId("kind").value };

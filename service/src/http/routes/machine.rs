@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 
 use super::super::guard::{Arrived, Asks, Body, By, Known, NAME_MAX, Named, Unheard, plain};
 use super::super::state::State;
+use super::journals::from_disk;
 use super::stops::{StopDone, StopRequest, understood};
 use super::{obey, obey_at_last, obey_since};
 use crate::desk::Desk;
@@ -132,11 +133,21 @@ pub(super) async fn stop(
     }))
 }
 
+/// The machine after a reset.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ResetDone {
+    #[serde(flatten)]
+    machine: MachineView,
+    /// That the machine's file has changed since the service read it, and is not used before the service is restarted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warning: Option<String>,
+}
+
 /// Starts the machine anew after a failure, and acknowledges each fault once. Axes must be zeroed again, but those whose drives prove that they kept their zero.
 #[utoipa::path(
     post, path = "/reset", tag = "machine", params(Asks),
     responses(
-        (status = 200, description = "It runs", body = MachineView),
+        (status = 200, description = "It runs", body = ResetDone),
         (status = "4XX", description = "Refused", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", description = "A cause is still there", body = ProblemBody, content_type = "application/problem+json"),
     )
@@ -145,9 +156,14 @@ pub(super) async fn reset(
     Of(state): Of<State>,
     By(caller): By,
     Arrived(arrival): Arrived,
-) -> Result<Json<MachineView>, Problem> {
+) -> Result<Json<ResetDone>, Problem> {
     obey_since(arrival, &state.desk, &caller, Order::Reset).await?;
-    Ok(Json(state.desk.machine()))
+    let looking = from_disk(state.clone(), move |desk| Ok(desk.config_change(&caller)));
+    Ok(Json(ResetDone {
+        // The reset is done, whatever the disk says.
+        warning: looking.await.ok().flatten(),
+        machine: state.desk.machine(),
+    }))
 }
 
 /// Asks for the right to command, or renews it with the header `Truestage-Lease`.

@@ -1,0 +1,65 @@
+//! The file that a configuration was read from.
+
+use std::path::{Path, PathBuf};
+
+use machine::records::ConfigHash;
+
+use super::whole;
+use crate::run::time_of_day;
+
+/// A configuration's file as it was read, to be compared with what it says later.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ConfigFile {
+    path: PathBuf,
+    text: ConfigHash,
+    /// When it was read, UTC, to the minute.
+    read_at: String,
+}
+
+impl ConfigFile {
+    /// The file at `path`, which has just been read as `text`.
+    pub(super) fn of(path: &Path, text: ConfigHash) -> Self {
+        Self {
+            path: path.to_owned(),
+            text,
+            read_at: time_of_day().strftime("%Y-%m-%d %H:%M UTC").to_string(),
+        }
+    }
+
+    /// That the file says something else by now, for whoever goes on with what it said. Reads the disk.
+    pub fn change(&self) -> Option<String> {
+        let (path, read_at) = (self.path.display(), &self.read_at);
+        let what = match whole::text_of(&self.path) {
+            Ok(text) if ConfigHash::of_texts(&text, &[]) == self.text => return None,
+            Ok(_) => format!("has changed since {read_at}"),
+            Err(_) => format!("cannot be read any more as it was at {read_at}"),
+        };
+        Some(format!(
+            "{path}: the file {what}, and the machine goes on with what it said then; restart the service to use it"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::load;
+
+    #[test]
+    fn a_file_that_says_something_else_is_noticed() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let path = file.path();
+        let text = include_str!("../../../configs/machines/linear.toml");
+        std::fs::write(path, text).unwrap();
+        let read = load(path).unwrap().file.unwrap();
+        assert_eq!(read.change(), None);
+        // Written anew with the same text, it says the same.
+        std::fs::write(path, text).unwrap();
+        assert_eq!(read.change(), None);
+        std::fs::write(path, format!("{text}\n# another word")).unwrap();
+        let said = read.change().unwrap();
+        assert!(said.contains("has changed since 20"), "{said}");
+        std::fs::remove_file(path).unwrap();
+        let said = read.change().unwrap();
+        assert!(said.contains("cannot be read any more"), "{said}");
+    }
+}
