@@ -4,6 +4,7 @@ use core::time::Duration;
 use units::{Approach, Radians, RadiansPerSecond, RadiansPerSecondSquared, Scale, Time};
 use wire::canopen::NodeId;
 
+use super::tests::state_units;
 use super::*;
 use crate::device::canopen_node::NodeSettings;
 use crate::device::fake_node::FakeNode;
@@ -77,6 +78,7 @@ impl FakeTable {
         ] {
             node.set(index, sub, &vec![0; len]);
         }
+        state_units(&mut node);
         let mut table = Self {
             node,
             state: 0x40,

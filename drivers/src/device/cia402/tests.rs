@@ -48,6 +48,12 @@ pub(super) struct FakeDrive {
     coasts: i64,
 }
 
+/// It counts in increments and seconds: its first motion need not be tried.
+pub(super) fn state_units(node: &mut FakeNode) {
+    node.set_u32(0x60A9, 0, 0x00B5_0300);
+    node.set_u32(0x60AA, 0, 0x00B5_5700);
+}
+
 impl FakeDrive {
     fn new() -> Self {
         let mut node = FakeNode::new(0x0002_0192);
@@ -80,8 +86,7 @@ impl FakeDrive {
             node.set(index, sub, &vec![0; len]);
         }
         node.set_u32(0x6502, 0, 0x21);
-        node.set_u32(0x60A9, 0, 0x00B5_0300);
-        node.set_u32(0x60AA, 0, 0x00B5_5700);
+        state_units(&mut node);
         Self {
             node,
             state: 0x40,

@@ -36,6 +36,8 @@ const ENDS_WITHIN: Duration = Duration::from_secs(4);
 const CONSTANT: f64 = 0.02;
 /// What was asked for agrees with what is seen.
 const AGREES: f64 = 0.2;
+/// A ramp that took this share of the whole time has not ended.
+const STILL: f64 = 0.8;
 /// So many times its noise is a way that can be measured.
 const MEASURABLE: i64 = 20;
 /// From the edge to the motion, beside the bus.
@@ -179,16 +181,17 @@ impl Trial {
             return None;
         }
         let factor = speed.abs() / asked_speed;
-        if !is_constant && factor < 1.0 {
-            let factor = gained / window / acceleration;
+        let delay = period + REACTION;
+        let moving = time.saturating_sub(delay).as_secs_f64();
+        let ramp = 2.0 * (moving - way.abs() as f64 / speed.abs());
+        let speeds_up = ramp > STILL * moving;
+        if speeds_up && factor < 1.0 - AGREES {
+            let factor = speed.abs() / moving / acceleration;
             return Some(Verdict::Acceleration { factor });
         }
         if (factor - 1.0).abs() > AGREES {
             return Some(Verdict::Speed { factor });
         }
-        let delay = period + REACTION;
-        let moving = time.saturating_sub(delay).as_secs_f64();
-        let ramp = 2.0 * (moving - way.abs() as f64 / speed.abs());
         let wanted = asked_speed / acceleration;
         let doubt = AGREES * wanted + 2.0 * delay.as_secs_f64();
         if (ramp - wanted).abs() > doubt {
