@@ -54,6 +54,9 @@ impl Failure {
             | Self::Usage { .. }
             | Self::Store(
                 StoreError::Io { .. }
+                | StoreError::Disk(_)
+                | StoreError::Unsynced { .. }
+                | StoreError::UseUnsynced { .. }
                 | StoreError::Unknown { .. }
                 | StoreError::Ambiguous { .. }
                 | StoreError::NoEarlier { .. }

@@ -6,21 +6,24 @@
 //! what it measured is recorded in the terms of its kind ([`Log`]).
 
 use core::marker::PhantomData;
-use std::fs::{self, File, OpenOptions};
-use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::difference::{Difference, first_difference};
+use super::door::Door;
+use super::files::{Files, OsFiles};
 use super::hash::ConfigHash;
 use super::head::{IdentityRecord, InstrumentRecord};
+use super::journal_file::JournalFile;
 use super::line::{opened, sealed};
+use super::run_name::RunName;
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
 };
-use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
+use super::{SCHEMA_VERSION, Store, StoreError, io_error, unsound};
 
 /// What a run is: written first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -169,11 +172,48 @@ enum Line<E> {
 }
 
 /// A journal being written, with a log of kind `L`.
+///
+/// In the store of a machine's thread ([`Store::ordered`]) what is written is ordered, in order, and a failure is heard
+/// at a later call. In any other store each call waits for the disk.
 #[derive(Debug)]
 pub struct Journal<L> {
     path: PathBuf,
-    file: File,
+    door: Door,
+    /// Locked by the thread that writes it alone.
+    file: Arc<Mutex<JournalFile>>,
     log: PhantomData<fn(L)>,
+}
+
+impl Store {
+    /// Starts a journal in this store.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create_journal<L: Log>(&self, header: &JournalHeader) -> Result<Journal<L>, StoreError> {
+        Journal::create_by(&self.door, &self.runs(), header)
+    }
+
+    /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
+    /// that it is continued with.
+    ///
+    /// # Errors
+    /// When it cannot be read or does not describe the same run as `header`.
+    pub fn resume_journal<L: Log>(
+        &self,
+        path: &Path,
+        header: &JournalHeader,
+        hash: &ConfigHash,
+    ) -> Result<(Journal<L>, ReadJournal<L>), StoreError> {
+        Journal::resume_by(&self.door, path, header, hash)
+    }
+
+    /// [`read_journal`] of this store.
+    ///
+    /// # Errors
+    /// Those of [`read_journal`].
+    pub fn read_journal<L: Log>(&self, path: &Path) -> Result<ReadJournal<L>, StoreError> {
+        read_by(&self.door, path)
+    }
 }
 
 impl<L: Log> Journal<L> {
@@ -182,60 +222,77 @@ impl<L: Log> Journal<L> {
     /// # Errors
     /// When it cannot be created.
     pub fn create(folder: &Path, header: &JournalHeader) -> Result<Self, StoreError> {
-        fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
-        let stamp = header.started.replace([':', '-'], "");
-        for attempt in 0..10_000_u32 {
-            let name = format!("{stamp}-{}-{}-{attempt:02}.jsonl", header.verb, header.axis);
-            let path = folder.join(name);
-            match OpenOptions::new().append(true).create_new(true).open(&path) {
-                Ok(file) => {
-                    let mut journal = Self::over(path, file);
-                    journal.append(&Mark::Header(Box::new(header.clone())))?;
-                    return Ok(journal);
-                }
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(io_error("create", &path)(error)),
-            }
-        }
-        let taken = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
-        Err(io_error("create a new journal in it", folder)(taken))
+        Self::create_by(&Door::of_system(), folder, header)
     }
 
-    /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
-    /// that it is continued with.
+    /// Continues the journal at `path`, as [`Store::resume_journal`].
     ///
     /// # Errors
-    /// When it cannot be read or does not describe the same run as `header`.
+    /// Those of [`Store::resume_journal`].
     pub fn resume(
         path: &Path,
         header: &JournalHeader,
         hash: &ConfigHash,
     ) -> Result<(Self, ReadJournal<L>), StoreError> {
-        let mut read = read_journal::<L>(path)?;
+        Self::resume_by(&Door::of_system(), path, header, hash)
+    }
+
+    fn create_by(door: &Door, folder: &Path, header: &JournalHeader) -> Result<Self, StoreError> {
+        let path = folder.join(free_name(door, folder, header)?);
+        let head = line_of(&Mark::Header(Box::new(header.clone())));
+        let journal = Self::over(door, path);
+        journal.order(move |file, files| file.create(files, &head))?;
+        door.note(&journal.path, None);
+        Ok(journal)
+    }
+
+    fn resume_by(
+        door: &Door,
+        path: &Path,
+        header: &JournalHeader,
+        hash: &ConfigHash,
+    ) -> Result<(Self, ReadJournal<L>), StoreError> {
+        let bytes = door.read(path).map_err(io_error("read", path))?;
+        let mut read = journal_of::<L>(path, &bytes)?;
         same_run(path, &read.header, header, hash)?;
         if read.complete {
             return Err(StoreError::AlreadyComplete {
                 path: path.to_owned(),
             });
         }
-        let file = OpenOptions::new()
-            .append(true)
-            .open(path)
-            .map_err(io_error("open", path))?;
-        file.set_len(read.valid_bytes)
-            .map_err(io_error("cut off its incomplete last line", path))?;
-        let mut journal = Self::over(path.to_owned(), file);
-        journal.append(&Mark::Resumed {
+        let mut kept = bytes;
+        kept.truncate(usize::try_from(read.valid_bytes).unwrap_or(usize::MAX));
+        kept.extend(line_of(&Mark::Resumed {
             at: header.started.clone(),
-        })?;
+        }));
+        let journal = Self::over(door, path.to_owned());
+        journal.order(move |file, files| file.go_on_from(files, &kept))?;
+        door.note(path, None);
         read.failure = None;
         read.log.keep_whole(&read.header);
         Ok((journal, read))
     }
 
-    const fn over(path: PathBuf, file: File) -> Self {
-        let log = PhantomData;
-        Self { path, file, log }
+    fn over(door: &Door, path: PathBuf) -> Self {
+        Self {
+            file: Arc::new(Mutex::new(JournalFile::new(&path))),
+            door: door.clone(),
+            path,
+            log: PhantomData,
+        }
+    }
+
+    fn order(
+        &self,
+        change: impl FnOnce(&mut JournalFile, &dyn Files) -> Result<(), StoreError> + Send + 'static,
+    ) -> Result<(), StoreError> {
+        let file = Arc::clone(&self.file);
+        self.door.change(move |files| {
+            change(
+                &mut file.lock().unwrap_or_else(PoisonError::into_inner),
+                files,
+            )
+        })
     }
 
     /// Where it is.
@@ -243,11 +300,10 @@ impl<L: Log> Journal<L> {
         &self.path
     }
 
-    /// Appends one entry; it is in the kernel's hands when this returns, so that killing the
-    /// process loses nothing.
+    /// Appends one entry. Once it was done, killing the process loses nothing of it.
     ///
     /// # Errors
-    /// When it cannot be written: the run must stop, its points would be lost.
+    /// When it, or anything before it, cannot be written: the run must stop, its points would be lost.
     pub fn write(&mut self, entry: &L::Entry) -> Result<(), StoreError> {
         self.append(entry)
     }
@@ -260,20 +316,20 @@ impl<L: Log> Journal<L> {
         self.append(&Mark::Failed { cause })
     }
 
-    /// Says that the run is complete, and forces everything to the disk.
+    /// Says that the run is complete, and forces everything to the disk. What is made of it is stored before: a run
+    /// whose calibration is not stored can go on.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn complete(&mut self) -> Result<(), StoreError> {
+        self.flush_to_disk()?;
         self.append(&Mark::Complete)?;
         self.flush_to_disk()
     }
 
-    fn append(&mut self, line: &impl Serialize) -> Result<(), StoreError> {
-        let json = serde_json::to_string(line).expect("plain data always serialises");
-        self.file
-            .write_all(sealed(&json).as_bytes())
-            .map_err(io_error("append to it", &self.path))
+    fn append(&self, line: &impl Serialize) -> Result<(), StoreError> {
+        let line = line_of(line);
+        self.order(move |file, _| file.append(&line))
     }
 
     /// Forces everything to the disk; called where the axis stands and time does not matter.
@@ -281,10 +337,28 @@ impl<L: Log> Journal<L> {
     /// # Errors
     /// When the disk refuses.
     pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
-        self.file
-            .sync_data()
-            .map_err(io_error("flush it to disk", &self.path))
+        self.order(|file, _| file.sync())
     }
+}
+
+/// As it stands in the file.
+fn line_of(line: &impl Serialize) -> Vec<u8> {
+    let json = serde_json::to_string(line).expect("plain data always serialises");
+    sealed(&json).into_bytes()
+}
+
+/// A name in `folder` that no journal has.
+fn free_name(door: &Door, folder: &Path, header: &JournalHeader) -> Result<String, StoreError> {
+    let names = match door.list(folder) {
+        Ok(names) => names,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+        Err(error) => return Err(io_error("list", folder)(error)),
+    };
+    let names = names.iter().map(|name| name.to_string_lossy().into_owned());
+    let names: Vec<String> = names.collect();
+    let stamp = header.started.replace([':', '-'], "");
+    let (verb, axis) = (header.verb.as_str(), header.axis.as_str());
+    Ok(RunName::next(&names, &stamp, verb, axis).text(verb, axis))
 }
 
 /// A journal that was read.
@@ -357,7 +431,11 @@ pub fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
 /// When it cannot be read, has no header, a line before the last one is damaged, or one says what
 /// cannot be.
 pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    read_by(&Door::of_system(), path)
+}
+
+fn read_by<L: Log>(door: &Door, path: &Path) -> Result<ReadJournal<L>, StoreError> {
+    let bytes = door.read(path).map_err(io_error("read", path))?;
     journal_of(path, &bytes)
 }
 
@@ -367,7 +445,7 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
 /// # Errors
 /// Those of [`read_journal`].
 pub fn read_entries(path: &Path) -> Result<(ReadJournal<AnyLog>, Vec<String>), StoreError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let bytes = OsFiles.read(path).map_err(io_error("read", path))?;
     let read = journal_of(path, &bytes)?;
     let whole = bytes.split_inclusive(|byte| *byte == b'\n');
     let whole = whole.filter_map(|line| json_of(line).ok());
@@ -386,6 +464,11 @@ fn journal_of<L: Log>(path: &Path, bytes: &[u8]) -> Result<ReadJournal<L>, Store
                 take(path, at + 1, parsed, &mut read)?;
             }
             Err(_) if at + 1 == lines.len() => torn = true,
+            // A hole that a power cut has left: nothing behind it was flushed to the disk.
+            Err(_) if line.contains(&0) => {
+                torn = true;
+                break;
+            }
             Err(cause) => {
                 return Err(StoreError::Format {
                     path: path.to_owned(),

@@ -28,23 +28,29 @@
 
 mod atomic;
 mod content;
+mod copy;
 mod difference;
+mod disk;
+mod door;
 mod failure;
 pub mod files;
 mod hash;
 mod head;
 mod interrupted;
 mod journal;
+mod journal_file;
 mod lease;
 mod line;
 mod name;
+mod run_name;
 pub mod sound;
 mod store;
 mod thermometers;
 
-pub use atomic::{remove_durably, replace_file, write_new_or_replace};
+pub use atomic::{remove_durably, remove_file, replace_file, write_new_or_replace};
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
+pub use disk::{Answer, DiskFailure, DiskPace};
 pub use failure::{ModelError, StoreError};
 pub use hash::ConfigHash;
 pub use head::{
@@ -58,10 +64,16 @@ pub use journal::{
 pub use lease::Lease;
 pub use line::{opened, sealed};
 pub use name::short;
+pub(crate) use store::Asked;
 pub use store::{ActivePointer, Store};
 pub use thermometers::ThermometersEntry;
 
 use failure::{io_error, unsound};
+
+#[cfg(test)]
+mod disk_tests;
+#[cfg(test)]
+mod enumeration_tests;
 
 /// The version of every file this program writes.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -1,12 +1,18 @@
 //! Calibrations: immutable, addressed by their content, activated by a pointer.
 
-use std::fs;
+use core::time::Duration;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::content::{CalibrationRecord, Content, ContentKind, Glance};
-use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound, write_new_or_replace};
+use super::disk::{Answer, Disk, DiskFailure, DiskPace};
+use super::door::Door;
+use super::files::Files;
+use super::run_name::RunName;
+use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound};
 
 /// Which calibration an axis uses, and which it used before (oldest first).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,6 +24,26 @@ pub struct ActivePointer {
     pub current: Option<String>,
     /// Those in use before.
     pub history: Vec<String>,
+}
+
+/// What was asked of the thread of the records.
+pub(crate) enum Asked<R> {
+    /// It was done at once.
+    Done(R),
+    /// The machine lives on until it is done.
+    Under(Answer<R>),
+    /// The machine's clock stands until it is done.
+    Held(Answer<R>),
+}
+
+impl<R> Asked<R> {
+    /// The answer, if it is there within `span`; nothing lives on meanwhile.
+    pub(crate) fn within(self, span: Duration) -> Result<Option<R>, DiskFailure> {
+        match self {
+            Self::Done(answer) => Ok(Some(answer)),
+            Self::Under(mut answer) | Self::Held(mut answer) => answer.wait_for(span),
+        }
+    }
 }
 
 /// One machine's folder.
@@ -60,6 +86,7 @@ pub struct ActivePointer {
 pub struct Store {
     root: PathBuf,
     kinds: &'static [ContentKind],
+    pub(super) door: Door,
 }
 
 impl Store {
@@ -68,6 +95,121 @@ impl Store {
         Self {
             root: data_dir.join(machine),
             kinds,
+            door: Door::of_system(),
+        }
+    }
+
+    /// The same store in these `files`.
+    #[must_use]
+    pub fn in_files(self, files: Arc<dyn Files>) -> Self {
+        self.through(Door::Direct(files))
+    }
+
+    fn through(&self, door: Door) -> Self {
+        Self {
+            door,
+            ..self.clone()
+        }
+    }
+
+    /// The same store for the thread of a machine, which waits for no disk: what it reads is read now, and what it
+    /// writes is ordered. Whether that was done is heard by [`Store::heard`].
+    ///
+    /// # Errors
+    /// When the thread of the records cannot be started.
+    pub fn ordered(&self, pace: DiskPace) -> io::Result<Self> {
+        let disk = Disk::start(Arc::clone(self.door.files()), &self.root, pace)?;
+        Ok(self.through(Door::Ordered(disk)))
+    }
+
+    /// The same store for any other thread: each call waits for the disk.
+    #[must_use]
+    pub fn direct(&self) -> Self {
+        self.through(Door::Direct(Arc::clone(self.door.files())))
+    }
+
+    /// Does `work` in the thread of the records, after all that was ordered before; at once, where there is none.
+    pub(crate) fn ask<R: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Self) -> R + Send + 'static,
+    ) -> Result<Asked<R>, DiskFailure> {
+        let Door::Ordered(disk) = &self.door else {
+            return Ok(Asked::Done(work(self)));
+        };
+        let within = self.through(Door::Within(Arc::clone(disk.shared())));
+        let answer = disk.ask(move || work(&within))?;
+        Ok(match disk.lets_time_pass() {
+            true => Asked::Under(answer),
+            false => Asked::Held(answer),
+        })
+    }
+
+    /// Whether all that was done so far went well. What was ordered and has not been done yet is not in it: see
+    /// [`ask_disk`](crate::ask_disk).
+    ///
+    /// # Errors
+    /// Of the first that did not; it is said once.
+    pub fn heard(&self) -> Result<(), StoreError> {
+        let Door::Ordered(disk) = &self.door else {
+            return Ok(());
+        };
+        disk.hear_failure().map_or(Ok(()), Err)
+    }
+
+    fn zero_note_path(&self, axis: &str) -> PathBuf {
+        self.root.join("zeros").join(format!("{axis}.json"))
+    }
+
+    /// What is noted of the zero of `axis`.
+    pub(crate) fn read_zero_note(&self, axis: &str) -> Option<String> {
+        let bytes = self.door.read(&self.zero_note_path(axis)).ok()?;
+        String::from_utf8(bytes).ok()
+    }
+
+    /// Notes the zero of `axis`.
+    pub(crate) fn write_zero_note(&self, axis: &str, text: String) -> Result<(), StoreError> {
+        self.door
+            .replace(&self.zero_note_path(axis), text.into_bytes())
+    }
+
+    /// Believes the note of the zero of `axis` no more, and says where it is. It is to be removed.
+    pub(crate) fn hide_zero_note(&self, axis: &str) -> PathBuf {
+        let path = self.zero_note_path(axis);
+        if let Door::Ordered(disk) = &self.door {
+            disk.shared().copy().remove(&path);
+        }
+        path
+    }
+
+    /// Takes the note of the zero of `axis` away. Not in an ordered store.
+    pub(crate) fn remove_zero_note(&self, axis: &str) -> io::Result<()> {
+        self.door.remove(&self.zero_note_path(axis))
+    }
+
+    /// Has the calibrations `ids` ready for who reads them. In the thread of the records.
+    pub fn hold_calibrations<'i>(&self, ids: impl IntoIterator<Item = &'i str>) {
+        for id in ids {
+            let path = self.calibration_path(id);
+            if let Ok(bytes) = self.door.read(&path) {
+                self.door.note(&path, Some(&bytes));
+            }
+        }
+    }
+
+    /// Has the content of `path` ready for who reads it next. In the thread of the records.
+    pub(crate) fn hold(&self, path: &Path) {
+        if let Door::Within(shared) = &self.door
+            && let Ok(bytes) = self.door.read(path)
+        {
+            shared.copy().hold(path, bytes);
+        }
+    }
+
+    /// How many orders the thread of the records has not done yet.
+    pub fn waiting(&self) -> u64 {
+        match &self.door {
+            Door::Ordered(disk) => disk.waiting(),
+            Door::Direct(_) | Door::Within(_) => 0,
         }
     }
 
@@ -81,20 +223,23 @@ impl Store {
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn journals(&self) -> Result<Vec<String>, StoreError> {
-        let mut names = list_folder(&self.runs())?;
+        let mut names = self.list_folder(&self.runs())?;
         names.retain(|name| name.ends_with(".jsonl"));
         Ok(names)
     }
 
-    /// The newest journal of `verb` on `axis`; their names begin with the time.
+    /// The newest journal of `verb` on `axis`. Their names are in the order in which they were begun, also where the
+    /// clock was set back meanwhile.
     ///
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn newest_run(&self, verb: &str, axis: &str) -> Result<Option<PathBuf>, StoreError> {
-        let part = format!("-{verb}-{axis}-");
-        let mut names = self.journals()?;
-        names.retain(|name| name.contains(&part));
-        Ok(names.into_iter().max().map(|name| self.runs().join(name)))
+        let names = self.journals()?;
+        let newest = names
+            .into_iter()
+            .filter_map(|name| Some((RunName::parse(&name, verb, axis)?, name)))
+            .max();
+        Ok(newest.map(|(_, name)| self.runs().join(name)))
     }
 
     /// The folder of the run journals.
@@ -123,7 +268,7 @@ impl Store {
     pub fn save<C: Content>(&self, record: &CalibrationRecord<C>) -> Result<String, StoreError> {
         let bytes = record.bytes();
         let id = blake3::hash(&bytes).to_hex().to_string();
-        write_new_or_replace(&self.calibration_path(&id), &bytes)?;
+        self.door.replace(&self.calibration_path(&id), bytes)?;
         Ok(id)
     }
 
@@ -171,7 +316,7 @@ impl Store {
     /// Where calibration `id` is, and its bytes, if they are those that were stored.
     fn bytes(&self, id: &str) -> Result<(PathBuf, Vec<u8>), StoreError> {
         let path = self.calibration_path(id);
-        let bytes = fs::read(&path).map_err(io_error("read", &path))?;
+        let bytes = self.door.read(&path).map_err(io_error("read", &path))?;
         let seen = blake3::hash(&bytes).to_hex().to_string();
         if seen != id {
             return Err(StoreError::Damaged { path, seen });
@@ -203,7 +348,8 @@ impl Store {
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn list(&self) -> Result<Vec<String>, StoreError> {
-        let mut names: Vec<_> = list_folder(&self.root.join("calibrations"))?
+        let mut names: Vec<_> = self
+            .list_folder(&self.root.join("calibrations"))?
             .into_iter()
             .filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()))
             .collect();
@@ -216,7 +362,8 @@ impl Store {
         let runs = path.parent()?;
         let is_store = runs.file_name()? == "runs";
         let root = runs.parent()?.to_owned();
-        is_store.then_some(Self { root, kinds })
+        let door = Door::of_system();
+        is_store.then_some(Self { root, kinds, door })
     }
 
     /// The calibrations of a kind that were made from the journal called `source`, with their names;
@@ -253,7 +400,7 @@ impl Store {
     /// When the pointer is there but cannot be read.
     pub fn active(&self, axis: &str) -> Result<ActivePointer, StoreError> {
         let path = self.pointer_path(axis);
-        match fs::read(&path) {
+        match self.door.read(&path) {
             Ok(bytes) => parse_versioned(&path, &bytes),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(ActivePointer {
                 schema_version: SCHEMA_VERSION,
@@ -347,28 +494,24 @@ impl Store {
     /// # Errors
     /// When it cannot be written.
     pub fn write_report(&self, path: &Path, html: &str) -> Result<(), StoreError> {
-        write_new_or_replace(path, html.as_bytes())
+        self.door.replace(path, html.as_bytes().to_vec())
     }
 
     fn write_pointer(&self, axis: &str, pointer: &ActivePointer) -> Result<(), StoreError> {
         let bytes = serde_json::to_vec_pretty(pointer).expect("plain data always serialises");
-        write_new_or_replace(&self.pointer_path(axis), &bytes)
+        self.door.replace_pointer(&self.pointer_path(axis), bytes)
     }
-}
 
-/// The names in a folder; a missing folder is an empty one.
-fn list_folder(folder: &Path) -> Result<Vec<String>, StoreError> {
-    let entries = match fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(io_error("list", folder)(error)),
-    };
-    let mut names = Vec::new();
-    for entry in entries {
-        let entry = entry.map_err(io_error("list", folder))?;
-        names.push(entry.file_name().to_string_lossy().into_owned());
+    /// The names in a folder; a missing folder is an empty one.
+    fn list_folder(&self, folder: &Path) -> Result<Vec<String>, StoreError> {
+        let names = match self.door.list(folder) {
+            Ok(names) => names,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) => return Err(io_error("list", folder)(error)),
+        };
+        let names = names.iter().map(|name| name.to_string_lossy().into_owned());
+        Ok(names.collect())
     }
-    Ok(names)
 }
 
 /// Of which kind a calibration is, and of which axis.

@@ -1,3 +1,4 @@
+use std::fs;
 use super::*;
 
 /// Readings, of which a continued run keeps those that are even.
