@@ -27,10 +27,7 @@ pub(super) struct Behind {
 impl Behind {
     /// # Errors
     /// When the thread cannot be started.
-    pub(super) fn new(
-        mut file: impl Write + Send + 'static,
-        pace: DiskPace,
-    ) -> io::Result<Self> {
+    pub(super) fn new(mut file: impl Write + Send + 'static, pace: DiskPace) -> io::Result<Self> {
         let (blocks, waiting) = sync_channel::<Vec<u8>>(BLOCKS);
         let (over, ended) = sync_channel(1);
         let errno = Arc::new(AtomicI32::new(0));
@@ -112,7 +109,9 @@ mod tests {
         }
         let (over, hangs) = channel::<()>();
         let mut behind = Behind::new(Hangs(Mutex::new(hangs)), DiskPace::Wall).unwrap();
-        let taken = (0..2 * BLOCKS).take_while(|_| behind.write(b"x").is_ok()).count();
+        let taken = (0..2 * BLOCKS)
+            .take_while(|_| behind.write(b"x").is_ok())
+            .count();
         assert!((BLOCKS..=BLOCKS + 1).contains(&taken), "{taken}");
         drop(over);
     }

@@ -133,7 +133,12 @@ fn a_machine_lives_on_while_its_disk_hangs() {
     );
     settle(&mut machine, &store).unwrap().unwrap();
     assert!(machine.now() >= before + Duration::from_secs(1));
-    assert!(store.direct().read_journal::<AnyLog>(journal.path()).is_ok());
+    assert!(
+        store
+            .direct()
+            .read_journal::<AnyLog>(journal.path())
+            .is_ok()
+    );
 }
 
 struct LetGo {
@@ -219,6 +224,8 @@ fn what_is_read_was_read_before() {
     // A zero that is lost is not believed, whatever the disk does.
     store.hide_zero_note("x");
     assert_eq!(store.read_zero_note("x"), None);
-    let answered = ask_disk(&mut machine, &store, |store| store.remove_zero_note("x").is_ok());
+    let answered = ask_disk(&mut machine, &store, |store| {
+        store.remove_zero_note("x").is_ok()
+    });
     assert!(answered.unwrap());
 }

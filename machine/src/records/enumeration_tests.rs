@@ -98,7 +98,11 @@ impl Story {
     /// A machine that uses a calibration, and has a zero.
     fn begin() -> Self {
         let files = SimulatedFiles::new();
-        let store = Store::new("/data".as_ref(), "m", const { &[ContentKind::of::<Table>()] });
+        let store = Store::new(
+            "/data".as_ref(),
+            "m",
+            const { &[ContentKind::of::<Table>()] },
+        );
         let store = store.in_files(Arc::new(files.clone()));
         let old = store.save(&record(vec![0])).unwrap();
         store.activate("x", &old).unwrap();
@@ -125,7 +129,9 @@ impl Story {
             None => (self.store.create_journal::<Points>(&header())?, vec![]),
             Some(path) => {
                 let hash = ConfigHash::recorded("h");
-                let (journal, read) = self.store.resume_journal::<Points>(path, &header(), &hash)?;
+                let (journal, read) =
+                    self.store
+                        .resume_journal::<Points>(path, &header(), &hash)?;
                 (journal, read.log.0)
             }
         };
@@ -134,10 +140,18 @@ impl Story {
         if let Err(failure) = &measured {
             let _ = journal.fail(failure.to_string());
         }
-        measured
+        measured?;
+        self.kept.note = None;
+        self.store.write_zero_note("x", "a note".into())?;
+        self.kept.note = Some(true);
+        Ok(())
     }
 
-    fn measure(&mut self, journal: &mut Journal<Points>, mut points: Vec<u32>) -> Result<(), StoreError> {
+    fn measure(
+        &mut self,
+        journal: &mut Journal<Points>,
+        mut points: Vec<u32>,
+    ) -> Result<(), StoreError> {
         let next = points.last().copied().unwrap_or_default() + 1;
         for number in next..=POINTS {
             journal.write(&Point::Point { number })?;
@@ -155,15 +169,14 @@ impl Story {
         self.kept.is_used = true;
         journal.complete()?;
         self.kept.is_complete = true;
-        self.kept.note = None;
-        self.store.write_zero_note("x", "a note".into())?;
-        self.kept.note = Some(true);
         Ok(())
     }
 
     /// After a new start; `is_cut` when the power was cut before.
     fn check(&mut self, is_cut: bool, of: &str) {
-        let Kept { written, flushed, .. } = self.kept;
+        let Kept {
+            written, flushed, ..
+        } = self.kept;
         let promised = if is_cut { flushed } else { written };
         let newest = self.store.newest_run("calibrate", "x").unwrap();
         let mut complete = false;
@@ -173,7 +186,10 @@ impl Story {
         if let Some(path) = &newest {
             // One that nobody was told of may have no whole header yet.
             let read = self.store.read_journal::<Points>(path);
-            assert!(read.is_ok() || self.kept.journal.is_none(), "{of}: {read:?}");
+            assert!(
+                read.is_ok() || self.kept.journal.is_none(),
+                "{of}: {read:?}"
+            );
             if let Ok(read) = read {
                 let points = read.log.0;
                 let expected: Vec<u32> = (1..).take(points.len()).collect();
@@ -182,7 +198,12 @@ impl Story {
                 complete = read.complete;
             }
         }
-        let used = self.store.active("x").unwrap().current.expect("one is in use");
+        let used = self
+            .store
+            .active("x")
+            .unwrap()
+            .current
+            .expect("one is in use");
         let table = self.store.load::<Table>(&used).unwrap().content.points;
         let is_new = table == [1, 2, 3];
         assert!(is_new || used == self.old, "{of}: {table:?}");
@@ -213,7 +234,12 @@ fn what_counted_as_kept_is_there_after_any_fault() {
     let first = whole.files.calls();
     whole.run().unwrap();
     let calls = whole.files.calls();
-    let faults = [Fault::Error(28), Fault::Error(5), Fault::Partly(28), Fault::End];
+    let faults = [
+        Fault::Error(28),
+        Fault::Error(5),
+        Fault::Partly(28),
+        Fault::End,
+    ];
     let mut histories = 0;
     for call in first..calls {
         for fault in faults {
@@ -227,7 +253,9 @@ fn what_counted_as_kept_is_there_after_any_fault() {
                     let begun = story.run();
                     assert!(begun.is_err() || fault == Fault::Partly(28), "{of}");
                     end(&mut story, seed, &of);
-                    if story.kept.is_complete || resumed_is_over(&mut story, again, fault, seed, &of) {
+                    if story.kept.is_complete
+                        || resumed_is_over(&mut story, again, fault, seed, &of)
+                    {
                         histories += 1;
                         break;
                     }
@@ -252,7 +280,10 @@ fn end(story: &mut Story, seed: u32, of: &str) {
 /// Goes on with its call number `again` failing; whether it has no such call, and was done.
 fn resumed_is_over(story: &mut Story, again: usize, fault: Fault, seed: u32, of: &str) -> bool {
     if story.kept.journal.as_ref().is_some_and(|path| {
-        story.store.read_journal::<Points>(path).is_ok_and(|read| read.complete)
+        story
+            .store
+            .read_journal::<Points>(path)
+            .is_ok_and(|read| read.complete)
     }) {
         return true;
     }

@@ -1,5 +1,5 @@
-use std::fs;
 use super::*;
+use std::fs;
 
 /// Readings, of which a continued run keeps those that are even.
 #[derive(Clone, Debug, Default, PartialEq)]
