@@ -368,6 +368,22 @@ impl Bench {
     pub(crate) fn start_within(&self, words: &[&str], variables: &[(&str, &str)]) -> Process {
         let mut command = self.command();
         command.envs(variables.iter().copied());
+        self.start_by(command, words)
+    }
+
+    /// The same under strace with these options, which writes to `trace` in the machine's folder.
+    pub(crate) fn start_traced(&self, words: &[&str], trace: &str, options: &[&str]) -> Process {
+        let mut command = Command::new("strace");
+        command.current_dir(self.folder());
+        command.args(["-f", "-y", "--seccomp-bpf", "-o", trace]);
+        command
+            .args(options)
+            .arg(program("truestage"))
+            .arg("--json");
+        self.start_by(command, words)
+    }
+
+    fn start_by(&self, mut command: Command, words: &[&str]) -> Process {
         // `plan zero` is one verb.
         let verb = if words.starts_with(&["plan", "zero"]) {
             2

@@ -36,7 +36,11 @@ pub(crate) fn journal_to_resume(
     }
 }
 
-/// Runs what writes a journal of `verb` on `axis`; when somebody stops it, says how it goes on.
+fn is_stop(failure: &Failure) -> bool {
+    matches!(failure, Failure::Machine(failure) if failure.is_stop())
+}
+
+/// Runs what writes a journal of `verb` on `axis`; when somebody or the disk stops it, says how it goes on.
 pub(crate) fn resumable<R>(
     store: &Store,
     verb: &str,
@@ -46,7 +50,7 @@ pub(crate) fn resumable<R>(
 ) -> Result<R, Failure> {
     let before = store.newest_run(verb, axis)?;
     run().map_err(|failure| {
-        let is_asked = matches!(&failure, Failure::Machine(failure) if failure.is_stop());
+        let goes_on = is_stop(&failure) || failure.is_of_disk();
         let begun = || {
             store
                 .newest_run(verb, axis)
@@ -54,7 +58,7 @@ pub(crate) fn resumable<R>(
                 .filter(|it| Some(it) != before.as_ref())
         };
         match resumed.map(Path::to_owned).or_else(begun) {
-            Some(journal) if is_asked => Failure::Resumable {
+            Some(journal) if goes_on => Failure::Resumable {
                 source: Box::new(failure),
                 journal,
             },
@@ -110,6 +114,21 @@ mod tests {
         assert!(!said.contains("--resume"), "{said}");
         let said = stopped(&store, true, Failure::ScanMismatch { wrong: 1 });
         assert!(!said.contains("--resume"), "{said}");
+    }
+
+    #[test]
+    fn a_run_that_the_disk_ends_goes_on() {
+        let (_folder, store) = store();
+        let source = std::io::Error::from_raw_os_error(28);
+        let full = machine::records::StoreError::Unsynced {
+            path: "x".into(),
+            source,
+        };
+        let said = stopped(&store, true, full.into());
+        assert!(said.contains("--resume"), "{said}");
+        let hangs = machine::records::DiskFailure::Behind { waiting: 7 };
+        let said = stopped(&store, true, machine::Failure::from(hangs).into());
+        assert!(said.contains("--resume"), "{said}");
     }
 
     #[test]
