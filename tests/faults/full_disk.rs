@@ -10,6 +10,7 @@ use machine::records::{DiskPace, Store, StoreError, read_journal};
 use tests::Bench;
 use truestage::linear::LinearLog;
 use truestage::{CalibrateOptions, Failure, Machine};
+use units::Metres;
 
 use crate::scene::shortened;
 
@@ -151,7 +152,9 @@ fn a_disk_that_is_full_is_told_before_anything_moves() {
         let before = truth(&bench);
         let failure = calibrated(&mut bench.machine, &store, None).unwrap_err();
         assert!(matches!(failure, Failure::Store(_)), "{failure:?}");
-        assert_eq!(truth(&bench), before, "nothing was moved");
+        let moved = (truth(&bench) - before).abs();
+        // A stage that is off trembles.
+        assert!(moved < Metres(1e-9), "{moved:?}");
     }
 }
 

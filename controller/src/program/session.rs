@@ -75,6 +75,11 @@ impl Session {
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();
         let of_disk = pace.of_disk();
+        let ordered = store.ordered(of_disk);
+        let store = ordered.map_err(|source| Failure::File {
+            path: store.root().to_owned(),
+            source,
+        })?;
         let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
         output.detail(|| {
             let names: Vec<String> = assemble::ports(&loaded.config).into_keys().collect();
@@ -82,11 +87,6 @@ impl Session {
         });
         let transport = recorded(transport, args, &loaded, of_disk)?;
         let mut machine = Machine::new(&loaded, transport);
-        let ordered = store.ordered(of_disk);
-        let store = ordered.map_err(|source| Failure::File {
-            path: store.root().to_owned(),
-            source,
-        })?;
         kept_zero::keep(&mut machine, store.clone(), loaded.text.as_str().to_owned());
         machine.in_real_time();
         machine.observe(Box::new(output.bars(Bars::new)));

@@ -12,7 +12,6 @@ mod lines;
 mod start;
 
 use core::time::Duration;
-use nix::errno::Errno;
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
