@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 
-use tests::{Edit, GANTRY, LINEAR, ROTARY, Rig, Shipped, UVW, not_run};
+use tests::{GANTRY, LINEAR, ROTARY, Rig, Shipped, UVW, not_run};
 
 use crate::programs::Bench;
 
@@ -65,7 +65,15 @@ fn files_of_bus_threads(trace: &str) -> Vec<String> {
 
 fn can_trace() -> bool {
     let traced = Command::new("strace")
-        .args(["-f", "--seccomp-bpf", "-o", "/dev/null", "true"])
+        .args([
+            "-f",
+            "--seccomp-bpf",
+            "-e",
+            "trace=write",
+            "-o",
+            "/dev/null",
+            "true",
+        ])
         .status();
     traced.is_ok_and(|it| it.success())
 }
@@ -95,7 +103,6 @@ fn no_verb_waits_for_a_file_with_a_machine_in_hand() {
         return;
     }
     let linear = Bench::of(Rig::Pty, LINEAR, |text| text);
-    linear.configure("machine.toml", |text| text.edit("runs = 5", "runs = 2"));
     let record = ["scan", "--record", "bus.log"];
     check(
         LINEAR,
@@ -117,8 +124,14 @@ fn no_verb_waits_for_a_file_with_a_machine_in_hand() {
     let platform = Bench::of(Rig::Pty, UVW, |text| text);
     check(UVW, &platform, &[&["zero"], &["calibrate"], &["verify"]]);
     drop(platform);
-    let table = Bench::of(Rig::Pty, ROTARY, |text| text);
-    check(ROTARY, &table, &[&["zero"]]);
+    let table = crate::table::bench(Rig::Pty);
+    let verbs: [&[&str]; 4] = [
+        &["zero"],
+        &["calibrate", "--yes"],
+        &["verify", "--yes"],
+        &["move", "machine.toml", "c=10deg"],
+    ];
+    check(ROTARY, &table, &verbs);
 }
 
 #[test]

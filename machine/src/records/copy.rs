@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::files::Files;
-use super::store::ActivePointer;
+use super::pointer::ActivePointer;
 
 /// So many calibrations before the one in use are held: a harmful one is gone back from at once.
 const EARLIER: usize = 4;

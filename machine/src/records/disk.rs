@@ -14,33 +14,11 @@ use std::time::Instant;
 
 use super::StoreError;
 use super::copy::RecordsCopy;
+use super::disk_failure::DiskFailure;
 use super::files::Files;
 
 /// So many changes may wait. A point is measured in a tenth of a second at the fastest: minutes of a disk that hangs.
 const QUEUE: usize = 1024;
-
-/// Why the thread of the records took or did nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DiskFailure {
-    /// It has done nothing for too long.
-    #[error(
-        "the disk of the records has not answered for {} s: what was measured last may not be kept. Check the disk, its \
-         cable and its space, then go on with --resume", waited.as_secs()
-    )]
-    Silent {
-        /// For how long.
-        waited: Duration,
-    },
-    /// More waits to be written than is taken.
-    #[error(
-        "the disk of the records is too slow: {waiting} entries wait to be written, and no more are taken. Check the \
-         disk and what else writes to it, then go on with --resume"
-    )]
-    Behind {
-        /// How many.
-        waiting: u64,
-    },
-}
 
 type Change = Box<dyn FnOnce(&dyn Files) -> Result<(), StoreError> + Send>;
 type Question = Box<dyn FnOnce() + Send>;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::disk::DiskFailure;
+use super::disk_failure::DiskFailure;
 use super::sound::Unsound;
 use super::{SCHEMA_VERSION, short};
 

@@ -31,6 +31,7 @@ mod content;
 mod copy;
 mod difference;
 mod disk;
+mod disk_failure;
 mod door;
 mod failure;
 pub mod files;
@@ -39,9 +40,12 @@ mod head;
 mod interrupted;
 mod journal;
 mod journal_file;
+mod journal_writer;
 mod lease;
 mod line;
 mod name;
+mod ordered;
+mod pointer;
 mod run_name;
 pub mod sound;
 mod store;
@@ -50,7 +54,8 @@ mod thermometers;
 pub use atomic::{remove_durably, remove_file, replace_file, write_new_or_replace};
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
-pub use disk::{Answer, DiskFailure, DiskPace};
+pub use disk::{Answer, DiskPace};
+pub use disk_failure::DiskFailure;
 pub use failure::{ModelError, StoreError};
 pub use hash::ConfigHash;
 pub use head::{
@@ -58,14 +63,15 @@ pub use head::{
 };
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, Journal, JournalHeader, Log, ReadJournal, not_resumable, read_entries,
-    read_journal,
+    AnyLog, ClosureEntry, JournalHeader, Log, ReadJournal, read_entries, read_journal,
 };
+pub use journal_writer::{Journal, not_resumable};
 pub use lease::Lease;
 pub use line::{opened, sealed};
 pub use name::short;
-pub(crate) use store::Asked;
-pub use store::{ActivePointer, Store};
+pub(crate) use ordered::Asked;
+pub use pointer::ActivePointer;
+pub use store::Store;
 pub use thermometers::ThermometersEntry;
 
 use failure::{io_error, unsound};

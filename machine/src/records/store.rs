@@ -1,50 +1,17 @@
 //! Calibrations: immutable, addressed by their content, activated by a pointer.
 
-use core::time::Duration;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::content::{CalibrationRecord, Content, ContentKind, Glance};
-use super::disk::{Answer, Disk, DiskFailure, DiskPace};
 use super::door::Door;
 use super::files::Files;
+use super::pointer::ActivePointer;
 use super::run_name::RunName;
 use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound};
-
-/// Which calibration an axis uses, and which it used before (oldest first).
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ActivePointer {
-    /// Of this struct.
-    pub schema_version: u32,
-    /// The calibration in use.
-    pub current: Option<String>,
-    /// Those in use before.
-    pub history: Vec<String>,
-}
-
-/// What was asked of the thread of the records.
-pub(crate) enum Asked<R> {
-    /// It was done at once.
-    Done(R),
-    /// The machine lives on until it is done.
-    Under(Answer<R>),
-    /// The machine's clock stands until it is done.
-    Held(Answer<R>),
-}
-
-impl<R> Asked<R> {
-    /// The answer, if it is there within `span`; nothing lives on meanwhile.
-    pub(crate) fn within(self, span: Duration) -> Result<Option<R>, DiskFailure> {
-        match self {
-            Self::Done(answer) => Ok(Some(answer)),
-            Self::Under(mut answer) | Self::Held(mut answer) => answer.wait_for(span),
-        }
-    }
-}
 
 /// One machine's folder.
 ///
@@ -53,7 +20,7 @@ impl<R> Asked<R> {
 /// ```
 /// use machine::records::sound::{Judged, counted};
 /// use machine::records::{CalibrationRecord, Content, ContentKind, RecordHead, Store};
-/// use serde::{Deserialize, Serialize};
+/// use serde::Deserialize;
 ///
 /// #[derive(Debug, PartialEq, Serialize, Deserialize)]
 /// struct Note {
@@ -84,7 +51,7 @@ impl<R> Asked<R> {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Store {
-    root: PathBuf,
+    pub(super) root: PathBuf,
     kinds: &'static [ContentKind],
     pub(super) door: Door,
 }
@@ -105,111 +72,10 @@ impl Store {
         self.through(Door::Direct(files))
     }
 
-    fn through(&self, door: Door) -> Self {
+    pub(super) fn through(&self, door: Door) -> Self {
         Self {
             door,
             ..self.clone()
-        }
-    }
-
-    /// The same store for the thread of a machine, which waits for no disk: what it reads is read now, and what it
-    /// writes is ordered. Whether that was done is heard by [`Store::heard`].
-    ///
-    /// # Errors
-    /// When the thread of the records cannot be started.
-    pub fn ordered(&self, pace: DiskPace) -> io::Result<Self> {
-        let disk = Disk::start(Arc::clone(self.door.files()), &self.root, pace)?;
-        Ok(self.through(Door::Ordered(disk)))
-    }
-
-    /// The same store for any other thread: each call waits for the disk.
-    #[must_use]
-    pub fn direct(&self) -> Self {
-        self.through(Door::Direct(Arc::clone(self.door.files())))
-    }
-
-    /// Does `work` in the thread of the records, after all that was ordered before; at once, where there is none.
-    pub(crate) fn ask<R: Send + 'static>(
-        &self,
-        work: impl FnOnce(&Self) -> R + Send + 'static,
-    ) -> Result<Asked<R>, DiskFailure> {
-        let Door::Ordered(disk) = &self.door else {
-            return Ok(Asked::Done(work(self)));
-        };
-        let within = self.through(Door::Within(Arc::clone(disk.shared())));
-        let answer = disk.ask(move || work(&within))?;
-        Ok(match disk.lets_time_pass() {
-            true => Asked::Under(answer),
-            false => Asked::Held(answer),
-        })
-    }
-
-    /// Whether all that was done so far went well. What was ordered and has not been done yet is not in it: see
-    /// [`ask_disk`](crate::ask_disk).
-    ///
-    /// # Errors
-    /// Of the first that did not; it is said once.
-    pub fn heard(&self) -> Result<(), StoreError> {
-        let Door::Ordered(disk) = &self.door else {
-            return Ok(());
-        };
-        disk.hear_failure().map_or(Ok(()), Err)
-    }
-
-    fn zero_note_path(&self, axis: &str) -> PathBuf {
-        self.root.join("zeros").join(format!("{axis}.json"))
-    }
-
-    /// What is noted of the zero of `axis`.
-    pub(crate) fn read_zero_note(&self, axis: &str) -> Option<String> {
-        let bytes = self.door.read(&self.zero_note_path(axis)).ok()?;
-        String::from_utf8(bytes).ok()
-    }
-
-    /// Notes the zero of `axis`.
-    pub(crate) fn write_zero_note(&self, axis: &str, text: String) -> Result<(), StoreError> {
-        self.door
-            .replace(&self.zero_note_path(axis), text.into_bytes())
-    }
-
-    /// Believes the note of the zero of `axis` no more, and says where it is. It is to be removed.
-    pub(crate) fn hide_zero_note(&self, axis: &str) -> PathBuf {
-        let path = self.zero_note_path(axis);
-        if let Door::Ordered(disk) = &self.door {
-            disk.shared().copy().remove(&path);
-        }
-        path
-    }
-
-    /// Takes the note of the zero of `axis` away. Not in an ordered store.
-    pub(crate) fn remove_zero_note(&self, axis: &str) -> io::Result<()> {
-        self.door.remove(&self.zero_note_path(axis))
-    }
-
-    /// Has the calibrations `ids` ready for who reads them. In the thread of the records.
-    pub fn hold_calibrations<'i>(&self, ids: impl IntoIterator<Item = &'i str>) {
-        for id in ids {
-            let path = self.calibration_path(id);
-            if let Ok(bytes) = self.door.read(&path) {
-                self.door.note(&path, Some(&bytes));
-            }
-        }
-    }
-
-    /// Has the content of `path` ready for who reads it next. In the thread of the records.
-    pub(crate) fn hold(&self, path: &Path) {
-        if let Door::Within(shared) = &self.door
-            && let Ok(bytes) = self.door.read(path)
-        {
-            shared.copy().hold(path, bytes);
-        }
-    }
-
-    /// How many orders the thread of the records has not done yet.
-    pub fn waiting(&self) -> u64 {
-        match &self.door {
-            Door::Ordered(disk) => disk.waiting(),
-            Door::Direct(_) | Door::Within(_) => 0,
         }
     }
 
