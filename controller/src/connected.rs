@@ -40,20 +40,13 @@ impl DerefMut for Machine {
     }
 }
 
-/// Where it is noted of each axis that it has its zero, beside the records.
-const ZEROS: &str = "zeros";
-
 impl Machine {
     /// A machine over `transport`, whose ports are numbered as [`assemble::ports`] says.
     /// Nothing is sent yet.
     pub fn new(loaded: &Loaded, transport: Box<dyn Transport>) -> Self {
         let mut core = machine::Machine::new(assemble::parts(loaded), transport);
         let store = loaded.config.machine.store();
-        kept_zero::keep(
-            &mut core,
-            store.root().join(ZEROS),
-            loaded.text.as_str().to_owned(),
-        );
+        kept_zero::keep(&mut core, store, loaded.text.as_str().to_owned());
         Self {
             core,
             config: loaded.config.clone(),

@@ -13,6 +13,8 @@ use crate::assemble;
 use crate::config::{CanTransport, MachineConfig};
 use crate::failure::Failure;
 use machine::Patience;
+#[cfg(feature = "program")]
+use machine::records::DiskPace;
 
 /// Where a bus or a line is really found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,6 +115,15 @@ impl Pace {
     pub fn lockstep(path: &Path, name: &str) -> Result<Self, Failure> {
         let joined = Participant::join(path, name).map_err(OpenError::from)?;
         Ok(Self::Lockstep(joined))
+    }
+
+    /// How time passes for who waits for the disk.
+    #[cfg(feature = "program")]
+    pub(crate) const fn of_disk(&self) -> DiskPace {
+        match self {
+            Self::Wall(_) => DiskPace::Wall,
+            Self::Lockstep(_) => DiskPace::Shared,
+        }
     }
 
     /// The patience ([`Loaded::patience`]) that a machine needs: none in real time and on a

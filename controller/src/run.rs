@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::made_by::made_by;
 use crate::store::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, Log, RecordHead, SCHEMA_VERSION,
+    Store, StoreError,
 };
 
 /// How a calibration is made.
@@ -77,6 +78,22 @@ pub(crate) fn note_failure<L: Log>(journal: &mut Journal<L>, failure: &Failure) 
     // The failure itself is on its way to the operator; a journal that cannot take the note
     // as well changes nothing about it.
     let _ = journal.fail(failure.to_string());
+}
+
+/// Waits until all that `store` was ordered to write is on the disk.
+///
+/// # Errors
+/// Of the first that is not; whatever stops `machine` meanwhile.
+pub(crate) fn settle(machine: &mut machine::Machine, store: &Store) -> Result<(), Failure> {
+    Ok(machine::settle(machine, store)??)
+}
+
+/// Whether what `stored` a calibration has put it into use.
+pub(crate) fn is_used_by(stored: &Result<(), Failure>) -> bool {
+    matches!(
+        stored,
+        Ok(()) | Err(Failure::Store(StoreError::UseUnsynced { .. }))
+    )
 }
 
 /// The head of a record without measurements, which says who `machine` is.

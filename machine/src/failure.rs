@@ -12,6 +12,7 @@ use wire::can::CanId;
 use crate::bus_text::{identifier_text, link_text};
 use crate::diagnosis::Finding;
 use crate::engine::EngineFailure;
+use crate::records::DiskFailure;
 
 /// What shells add to the number of the signal that ended a program.
 const STOPPED_BY: u8 = 128;
@@ -197,6 +198,9 @@ pub enum Failure {
         /// What there is.
         known: String,
     },
+    /// The disk of the records is too slow, or does not answer.
+    #[error(transparent)]
+    Disk(#[from] DiskFailure),
     /// Somebody asked to stop (Ctrl-C).
     #[error("stopped on request")]
     Interrupted,
@@ -237,6 +241,7 @@ impl Failure {
             | Self::ZeroNoted { .. }
             | Self::NoSuchAxis { .. }
             | Self::NoSuchDevice { .. }
+            | Self::Disk(_)
             | Self::Interrupted
             | Self::Terminated { .. } => None,
         }
@@ -258,7 +263,7 @@ impl Failure {
             Self::HeldUp { failure, .. } | Self::Explained { failure, .. } => failure.exit_code(),
             Self::Interrupted => STOPPED_BY + SIGINT,
             Self::Terminated { signal } => STOPPED_BY.saturating_add(*signal),
-            Self::NoSuchAxis { .. } | Self::NoSuchDevice { .. } => 2,
+            Self::NoSuchAxis { .. } | Self::NoSuchDevice { .. } | Self::Disk(_) => 2,
             Self::SoftLimit { .. }
             | Self::NotZeroed { .. }
             | Self::ZeroNoted { .. }

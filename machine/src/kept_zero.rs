@@ -5,23 +5,29 @@
 //! that does not fit, has no zero. The order makes any moment safe to die in: the note is never older than the zero.
 
 use core::time::Duration;
-use std::path::PathBuf;
+use std::io;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use drivers::device::{DriveCommand, ReferenceLost, ServoDrive};
 
+use crate::disk::ask_disk;
 use crate::failure::Failure;
 use crate::machine::Machine;
-use crate::records::IdentityRecord;
+use crate::records::{IdentityRecord, Store};
 use crate::zero_notes::{KeptZeros, Note, VERSION};
 
-/// Notes in `folder` what the drives of `machine` show of their reference, of those that prove it, and believes at a start
+/// Notes in `store` what the drives of `machine` show of their reference, of those that prove it, and believes at a start
 /// what was noted of a machine of the same `configuration` (its hash).
-pub fn keep(machine: &mut Machine, folder: PathBuf, configuration: String) {
+pub fn keep(machine: &mut Machine, store: Store, configuration: String) {
     machine.kept_zeros = Some(KeptZeros {
-        folder,
+        store,
         configuration,
     });
+}
+
+/// The store in which zeros are noted; `None` where they are not.
+pub fn store_of(machine: &Machine) -> Option<Store> {
+    machine.kept_zeros.as_ref().map(|kept| kept.store.clone())
 }
 
 /// Whether the drive of `axis` can prove that it kept its zero over a restart.
@@ -130,9 +136,10 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
     let Some(kept) = &machine.kept_zeros else {
         return Ok(Ok(()));
     };
+    let (store, configuration) = (kept.store.clone(), kept.configuration.clone());
     let note = Note {
         schema_version: VERSION,
-        configuration: kept.configuration.clone(),
+        configuration,
         drive: drive_record(machine, at),
         mark: shown.mark,
         homed: shown.homed,
@@ -145,27 +152,51 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
         error_code: shown.error_code,
         axis,
     };
-    Ok(kept.write(&note).map_err(|it| it.to_string()))
+    let (axis, text) = (note.axis.clone(), note.text());
+    let noted = ask_disk(machine, &store, move |store| {
+        store.write_zero_note(&axis, text)
+    })?;
+    Ok(noted.map_err(|it| it.to_string()))
 }
 
 /// The axis has no zero any more, or is about to be moved somewhere else by a search for it. Also of a drive that proves
 /// nothing by this configuration: another one of the same machine may ask it to.
-pub(crate) fn forget(machine: &Machine, at: usize) -> Result<(), Failure> {
-    match &machine.kept_zeros {
-        Some(kept) => kept.forget(&machine.devices.name(at)),
-        None => Ok(()),
-    }
+pub(crate) fn forget(machine: &mut Machine, at: usize) -> Result<(), Failure> {
+    let Some(store) = store_of(machine) else {
+        return Ok(());
+    };
+    let axis = machine.devices.name(at);
+    let path = store.hide_zero_note(&axis);
+    let removed = ask_disk(machine, &store, move |store| store.remove_zero_note(&axis))?;
+    removed.map_err(|source| Failure::ZeroNoted { path, source })
 }
+
+/// How long a stop that is over waits for the disk: its answer is for the operator alone.
+const AFTER_A_STOP: Duration = Duration::from_millis(100);
 
 /// Forgets what an alarm has made doubtful, now that there is time for files.
 pub(crate) fn forget_doubted(machine: &mut Machine) {
+    let Some(store) = store_of(machine) else {
+        return machine.doubted.fill(false);
+    };
     for at in 0..machine.doubted.len() {
         if !std::mem::take(&mut machine.doubted[at]) {
             continue;
         }
-        if let Err(failure) = forget(machine, at) {
-            machine.notices.warn(failure.to_string());
-        }
+        let axis = machine.devices.name(at);
+        let path = store.hide_zero_note(&axis);
+        let asked = store.ask(move |store| store.remove_zero_note(&axis));
+        let removed = asked.and_then(|asked| asked.within(AFTER_A_STOP));
+        let failure = match removed {
+            Ok(Some(Ok(()))) => continue,
+            Ok(Some(Err(source))) => Failure::ZeroNoted { path, source },
+            Ok(None) => Failure::ZeroNoted {
+                path,
+                source: io::ErrorKind::TimedOut.into(),
+            },
+            Err(failure) => failure.into(),
+        };
+        machine.notices.warn(failure.to_string());
     }
 }
 

@@ -1,15 +1,9 @@
 //! What is noted of zeros: a file for each axis whose drive can prove that it kept its reference.
 
-use std::fs;
-use std::path::PathBuf;
-
 use drivers::device::DriveReference;
 use serde::{Deserialize, Serialize};
 
-use crate::failure::Failure;
-use crate::records::{
-    IdentityRecord, StoreError, opened, remove_durably, sealed, write_new_or_replace,
-};
+use crate::records::{IdentityRecord, Store, opened, sealed};
 
 /// Of the note. One of another version is none.
 pub(crate) const VERSION: u32 = 1;
@@ -17,7 +11,7 @@ pub(crate) const VERSION: u32 = 1;
 /// Where the notes are, and of which configuration.
 #[derive(Debug)]
 pub(crate) struct KeptZeros {
-    pub(crate) folder: PathBuf,
+    pub(crate) store: Store,
     pub(crate) configuration: String,
 }
 
@@ -57,29 +51,17 @@ impl Note {
 }
 
 impl KeptZeros {
-    fn path(&self, axis: &str) -> PathBuf {
-        self.folder.join(format!("{axis}.json"))
-    }
-
     pub(crate) fn read(&self, axis: &str) -> Option<Note> {
-        let text = fs::read_to_string(self.path(axis)).ok()?;
+        let text = self.store.read_zero_note(axis)?;
         let json = opened(text.trim_end()).ok()?;
         serde_json::from_str(&json).ok()
     }
+}
 
-    /// Takes it away.
-    ///
-    /// # Errors
-    /// When there is one and it cannot be removed: it would be believed at the next start.
-    pub(crate) fn forget(&self, axis: &str) -> Result<(), Failure> {
-        let path = self.path(axis);
-        remove_durably(&path).map_err(|source| Failure::ZeroNoted { path, source })
-    }
-
-    /// # Errors
-    /// When it cannot be written; there is none then.
-    pub(crate) fn write(&self, note: &Note) -> Result<(), StoreError> {
-        let json = serde_json::to_string(note).expect("a note is an object");
-        write_new_or_replace(&self.path(&note.axis), sealed(&json).as_bytes())
+impl Note {
+    /// As it stands in its file.
+    pub(crate) fn text(&self) -> String {
+        let json = serde_json::to_string(self).expect("a note is an object");
+        sealed(&json)
     }
 }

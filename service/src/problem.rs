@@ -337,6 +337,9 @@ const fn code_of_store(failure: &machine::records::StoreError) -> Code {
         | Of::Part { .. } => Code::Calibration,
         Of::AlreadyComplete { .. } | Of::NotResumable { .. } => Code::Refused,
         Of::Io { .. }
+        | Of::Disk(_)
+        | Of::Unsynced { .. }
+        | Of::UseUnsynced { .. }
         | Of::Damaged { .. }
         | Of::Format { .. }
         | Of::Unsound { .. }
@@ -350,7 +353,7 @@ fn code_of_machine(failure: &machine::Failure) -> Code {
     match failure {
         Of::SoftLimit { .. } => Code::SoftLimit,
         Of::NotZeroed { .. } => Code::NotZeroed,
-        Of::ZeroNoted { .. } => Code::Storage,
+        Of::ZeroNoted { .. } | Of::Disk(_) => Code::Storage,
         Of::NotStarted { .. } => Code::ErrorStop,
         Of::NoSuchAxis { .. } => Code::NoSuchAxis,
         Of::NoSuchDevice { .. } => Code::Configuration,

@@ -12,9 +12,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{self, JoinHandle};
 
-use machine::attend;
 use machine::records::files::{Files, os_files};
 use machine::records::{AnyLog, Store, read_journal};
+use machine::{ask_disk, attend};
 use triple_buffer::Input;
 use truestage::runs::{Choice, Found, Group, Teller};
 use truestage::{Failure, Machine, groups};
@@ -192,7 +192,9 @@ fn keep(
     };
     kept.machine.guarded(Machine::start)?;
     kept.load_courses();
-    kept.offer_runs();
+    if let Err(failure) = kept.offer_runs() {
+        kept.failed(failure);
+    }
     let mut keeper = kept.keeper.borrow_mut();
     keeper.set_mode(Mode::Idle);
     // Whoever is told that the machine is there sees it so.
@@ -201,7 +203,7 @@ fn keep(
     // Whoever started it may have gone.
     let _ = told.send((
         fixed,
-        kept.store.clone(),
+        kept.store.direct(),
         (kept.teller.as_ref().map(|it| it.page), judges),
     ));
     let ended = kept.live();
@@ -369,10 +371,12 @@ impl Kept {
     }
 
     /// The newest journal that a run like `task` has left unfinished.
-    fn newest_journal(&self, task: &RunTask) -> Option<PathBuf> {
-        let verb = task.request.kind.stage().text();
-        let found = self.store.interrupted_run(verb, task.group.journals());
-        found.ok().flatten().map(|it| it.journal)
+    fn newest_journal(&mut self, task: &RunTask) -> Result<Option<PathBuf>, Failure> {
+        let (kind, group) = (task.request.kind, Arc::clone(&task.group));
+        let found = ask_disk(&mut self.machine, &self.store, move |store| {
+            store.interrupted_run(kind.stage().text(), group.journals())
+        });
+        Ok(found?.ok().flatten().map(|it| it.journal))
     }
 
     /// One run, from its begin to its end.
@@ -380,13 +384,17 @@ impl Kept {
         let Some(task) = self.keeper.borrow_mut().begin_run(id) else {
             return;
         };
-        let before = self.newest_journal(&task);
-        let result = self.perform(&task);
+        let (before, result) = match self.newest_journal(&task) {
+            Ok(before) => (before, self.perform(&task)),
+            Err(failure) => (None, Err(failure)),
+        };
         self.machine.leave_instrument();
         self.keeper.borrow_mut().end_procedure(id);
-        if result.is_err() {
-            self.leave(&task, before);
-        }
+        let result = result.map_err(|failure| match self.leave(&task, before) {
+            // What a machine says while the disk is waited for counts.
+            Err(since) if since.stops_the_machine() => since,
+            _ => failure,
+        });
         match result {
             // The next tick ends the service.
             Err(_) if self.machine.stop_request().is_requested() => {}
@@ -431,20 +439,26 @@ impl Kept {
 
     /// Where a run that ended early goes on, if it is one that can. `before` is the journal that was the newest when it
     /// began: that of an earlier run.
-    fn leave(&mut self, task: &RunTask, before: Option<PathBuf>) {
+    fn leave(&mut self, task: &RunTask, before: Option<PathBuf>) -> Result<(), Failure> {
         let begun = match &task.resume {
-            Some(journal) => Some(journal.clone()).filter(|it| is_incomplete(it)),
+            Some(journal) => {
+                let own = journal.clone();
+                let incomplete =
+                    ask_disk(&mut self.machine, &self.store, move |_| is_incomplete(&own));
+                incomplete?.then(|| journal.clone())
+            }
             None if task.is_resumed => {
-                let newest = self.newest_journal(task);
+                let newest = self.newest_journal(task)?;
                 newest.filter(|it| before.as_ref() != Some(it))
             }
             None => None,
         };
         self.keeper.borrow_mut().run_left(&task.id, begun);
+        Ok(())
     }
 
     /// Runs that were interrupted before this service began can go on.
-    fn offer_runs(&mut self) {
+    fn offer_runs(&mut self) -> Result<(), Failure> {
         let groups = self.keeper.borrow().groups();
         for group in groups {
             for kind in RunKind::ALL {
@@ -453,7 +467,10 @@ impl Kept {
                 if kind.has_rows() || !is_resumed {
                     continue;
                 }
-                let found = self.store.interrupted_run(stage.text(), group.journals());
+                let of_group = group.clone();
+                let found = ask_disk(&mut self.machine, &self.store, move |store| {
+                    store.interrupted_run(stage.text(), of_group.journals())
+                })?;
                 let mut keeper = self.keeper.borrow_mut();
                 match found {
                     Ok(Some(found)) => keeper.offer_run(kind, &found),
@@ -462,6 +479,7 @@ impl Kept {
                 }
             }
         }
+        Ok(())
     }
 
     fn perform(&mut self, task: &RunTask) -> Result<Found, Failure> {

@@ -6,6 +6,7 @@ mod begin;
 mod calibrations;
 mod controls;
 mod demo;
+mod disk;
 mod example;
 mod examples;
 mod foreign_files;

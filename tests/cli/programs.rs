@@ -382,6 +382,18 @@ impl Bench {
         process
     }
 
+    /// The same under strace with these options, which writes to `trace` in the machine's folder.
+    pub(crate) fn start_traced(&self, words: &[&str], trace: &str, options: &[&str]) -> Process {
+        let verb = self.verb(words);
+        let mut command = Command::new("strace");
+        command.current_dir(self.folder());
+        command.args(["-f", "-y", "--seccomp-bpf", "-o", trace]);
+        command.args(options).arg(verb.get_program());
+        let mut process = Process::start(command.args(verb.get_args()));
+        process.is_client = self.folder().join(SOCKET).exists();
+        process
+    }
+
     /// The verb, not started yet.
     pub(crate) fn verb(&self, words: &[&str]) -> Command {
         let mut command = self.command();

@@ -16,7 +16,7 @@ use crate::programs::{Bench, live_rigs, number, text};
 const OFFSETS: &str = "offsets = [0, 73, 162]";
 const HAND: &str = "hand_lines = [73.0, 89.0, 38.5]";
 
-fn bench(rig: Rig) -> Bench {
+pub(crate) fn bench(rig: Rig) -> Bench {
     let bench = Bench::of(rig, ROTARY, |text| text.edit("hand_lines = []", HAND));
     bench.configure("machine.toml", |text| {
         let text = text.edit("placements = 4 ", &format!("{OFFSETS} "));

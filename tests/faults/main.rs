@@ -13,6 +13,7 @@ mod detectors;
 mod drive;
 mod files;
 mod foreign;
+mod full_disk;
 mod hall;
 mod laser;
 mod limits;

@@ -21,6 +21,20 @@ impl Failure {
         }
     }
 
+    /// Whether the disk of the records refused, or did not answer.
+    #[cfg(feature = "program")]
+    pub(crate) const fn is_of_disk(&self) -> bool {
+        matches!(
+            self,
+            Self::Store(
+                StoreError::Io { .. }
+                    | StoreError::Disk(_)
+                    | StoreError::Unsynced { .. }
+                    | StoreError::UseUnsynced { .. }
+            ) | Self::Machine(machine::Failure::Disk(_))
+        )
+    }
+
     /// Whether an axis may still move after it, or nobody supervises it: a device, a bus, or what is not known.
     pub fn stops_the_machine(&self) -> bool {
         match self.exit_code() {
@@ -54,6 +68,9 @@ impl Failure {
             | Self::Usage { .. }
             | Self::Store(
                 StoreError::Io { .. }
+                | StoreError::Disk(_)
+                | StoreError::Unsynced { .. }
+                | StoreError::UseUnsynced { .. }
                 | StoreError::Unknown { .. }
                 | StoreError::Ambiguous { .. }
                 | StoreError::NoEarlier { .. }

@@ -7,7 +7,6 @@ use compensator::error_table::{self, Compensation, FitOptions, Fitted, uncertain
 use compensator::iso230;
 use units::Metres;
 
-use crate::config::ConfigHash;
 use crate::failure::Failure;
 use crate::linear::LinearContent;
 use crate::linear::LinearLog;
@@ -17,9 +16,9 @@ use crate::linear::run_plan::{RunPlan, of_calibration};
 use crate::linear::settings;
 use crate::linear::stage::{LinearStage, Usable};
 use crate::made_by::made_by;
-use crate::run::{CalibrateOptions, missing, note_failure, utc_now};
+use crate::run::{CalibrateOptions, is_used_by, missing, note_failure, settle, utc_now};
 use crate::store::{CalibrationRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store};
-use machine::Stage;
+use machine::{Stage, read_ahead};
 
 /// A calibration that was made, stored and activated.
 #[derive(Clone, Debug)]
@@ -42,6 +41,15 @@ pub struct Calibrated {
     pub budget: AxisBudget,
     /// Whether it is used from now on.
     pub is_in_use: bool,
+}
+
+/// What was made of a measurement, before it is stored.
+struct MadeCalibration {
+    record: CalibrationRecord<LinearContent>,
+    compensation: Compensation,
+    fitted: Fitted,
+    budget: AxisBudget,
+    noticed: Option<Metres>,
 }
 
 impl LinearStage<'_> {
@@ -67,39 +75,40 @@ impl LinearStage<'_> {
         // Before the header, which says who measures.
         self.core.use_instrument(&plan.instrument)?;
         let header = self.journal_header("calibrate", &plan, None);
-        let (mut journal, earlier) = open_journal(
-            store,
-            &header,
-            options.resume.as_ref(),
-            self.core.config_hash,
-        )?;
+        let resume = options.resume.as_ref();
+        let (mut journal, earlier) = self.open_journal(store, &header, resume)?;
         let measuring = MeasureOptions {
             stage: Stage::Calibrate,
             compensated: false,
         };
         let measured = self.measure_runs(&plan, measuring, &mut journal, earlier);
         let measured = measured.inspect_err(|failure| note_failure(&mut journal, failure))?;
-        let mut fitted = self.fit_table(&plan, &measured)?;
-        let budget = self.budget_of(&plan, &measured, &fitted)?;
-        let record = self.calibration_record(&plan, &journal, &measured, &fitted, &budget);
-        fitted.table = uncertainty::stated(&fitted.table, &budget);
-        let compensation = self.prepare(fitted.table.clone())?;
-        let harmless = settings::harmless(self.core.config, self.axis);
-        let noticed = fitted.table.judge_neighbours(harmless).ok().flatten();
-        let id = store.save(&record)?;
-        if !options.aside {
-            store.activate(self.axis, &id)?;
-            self.use_calibration(Usable {
-                compensation,
-                budget: Some(budget.clone()),
-                approach: self.approach_length(),
-            });
-            let figures = iso230::evaluate(&measured.series()?).ok();
-            self.memory.untried = Some(Untried {
-                id: id.clone(),
-                as_found: figures.map(|it| it.accuracy.bidirectional),
-            });
-        }
+        settle(&mut self.core, store)?;
+        let made = self.make_calibration(&plan, &journal, &measured);
+        let made = made.inspect_err(|failure| {
+            // It is measured whole, and stays what it is: nothing is to be gone on with.
+            note_failure(&mut journal, failure);
+            drop(journal.complete());
+        })?;
+        let id = store.save(&made.record)?;
+        // What is used was stored before.
+        settle(&mut self.core, store)?;
+        let stored = match options.aside {
+            true => Ok(()),
+            false => self.put_into_use(store, &id, &made, &measured),
+        };
+        let stored = stored.and_then(|()| {
+            journal.complete()?;
+            settle(&mut self.core, store)
+        });
+        stored.inspect_err(|failure| note_failure(&mut journal, failure))?;
+        let MadeCalibration {
+            record,
+            fitted,
+            budget,
+            noticed,
+            ..
+        } = made;
         Ok(Calibrated {
             path: store.calibration_path(&id),
             journal: journal.path().to_owned(),
@@ -111,6 +120,74 @@ impl LinearStage<'_> {
             budget,
             is_in_use: !options.aside,
         })
+    }
+
+    fn make_calibration(
+        &self,
+        plan: &RunPlan,
+        journal: &Journal<LinearLog>,
+        measured: &Measured,
+    ) -> Result<MadeCalibration, Failure> {
+        let mut fitted = self.fit_table(plan, measured)?;
+        let budget = self.budget_of(plan, measured, &fitted)?;
+        let record = self.calibration_record(plan, journal, measured, &fitted, &budget);
+        fitted.table = uncertainty::stated(&fitted.table, &budget);
+        let harmless = settings::harmless(self.core.config, self.axis);
+        Ok(MadeCalibration {
+            compensation: self.prepare(fitted.table.clone())?,
+            noticed: fitted.table.judge_neighbours(harmless).ok().flatten(),
+            record,
+            fitted,
+            budget,
+        })
+    }
+
+    /// Uses the calibration `id` from now on, now and after the next start.
+    fn put_into_use(
+        &mut self,
+        store: &Store,
+        id: &str,
+        made: &MadeCalibration,
+        measured: &Measured,
+    ) -> Result<(), Failure> {
+        let stored = store.activate(self.axis, id).map_err(Failure::from);
+        let stored = stored.and_then(|()| settle(&mut self.core, store));
+        if is_used_by(&stored) {
+            self.use_calibration(Usable {
+                compensation: made.compensation.clone(),
+                budget: Some(made.budget.clone()),
+                approach: self.approach_length(),
+            });
+            let figures = iso230::evaluate(&measured.series()?).ok();
+            self.memory.untried = Some(Untried {
+                id: id.to_owned(),
+                as_found: figures.map(|it| it.accuracy.bidirectional),
+            });
+        }
+        stored
+    }
+
+    /// A new journal, or one that is continued with its whole runs; it is on the disk when this returns.
+    pub(super) fn open_journal(
+        &mut self,
+        store: &Store,
+        header: &JournalHeader,
+        resume: Option<&PathBuf>,
+    ) -> Result<(Journal<LinearLog>, EarlierRuns), Failure> {
+        let Some(path) = resume else {
+            let journal = store.create_journal(header)?;
+            settle(&mut self.core, store)?;
+            return Ok((journal, EarlierRuns::default()));
+        };
+        read_ahead(&mut self.core, store, path.clone())?;
+        let hash = self.core.config_hash;
+        let (journal, read) = store.resume_journal::<LinearLog>(path, header, hash)?;
+        settle(&mut self.core, store)?;
+        let earlier = EarlierRuns {
+            points: read.log.points,
+            closures: read.log.closures,
+        };
+        Ok((journal, earlier))
     }
 
     /// Loads the calibration that `store` says is active for the axis, after checking that it
@@ -206,28 +283,6 @@ impl LinearStage<'_> {
             targets_m: plan.targets.iter().map(|target| target.value()).collect(),
             runs: plan.runs,
             approach_m: self.approach_length().map(Metres::value),
-        }
-    }
-}
-
-pub(super) fn open_journal(
-    store: &Store,
-    header: &JournalHeader,
-    resume: Option<&PathBuf>,
-    hash: &ConfigHash,
-) -> Result<(Journal<LinearLog>, EarlierRuns), Failure> {
-    match resume {
-        None => Ok((
-            Journal::create(&store.runs(), header)?,
-            EarlierRuns::default(),
-        )),
-        Some(path) => {
-            let (journal, read) = Journal::<LinearLog>::resume(path, header, hash)?;
-            let earlier = EarlierRuns {
-                points: read.log.points,
-                closures: read.log.closures,
-            };
-            Ok((journal, earlier))
         }
     }
 }

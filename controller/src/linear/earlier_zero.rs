@@ -1,6 +1,6 @@
 //! What is on record of a zero that was found earlier.
 
-use machine::kept_zero;
+use machine::{ask_disk, kept_zero};
 use units::Metres;
 
 use crate::config::AxisConfig;
@@ -9,13 +9,23 @@ use crate::handle::Core;
 use crate::linear::LinearLog;
 use crate::linear::memory::AxisMemory;
 use crate::memories::Memories;
-use crate::store::{Store, read_journal};
+use crate::store::Store;
 
 /// What the newest zero of an axis or a gantry has on record. A trend is worth having but never worth failing for:
 /// a journal that cannot be read is no reason not to zero.
-pub(super) fn newest_zero(store: &Store, name: &str) -> Option<LinearLog> {
-    let path = store.newest_run("zero", name).ok().flatten()?;
-    Some(read_journal::<LinearLog>(&path).ok()?.log)
+///
+/// # Errors
+/// Whatever stops the machine meanwhile.
+pub(super) fn newest_zero(
+    core: &mut Core<'_>,
+    store: &Store,
+    name: &str,
+) -> Result<Option<LinearLog>, Failure> {
+    let name = name.to_owned();
+    Ok(ask_disk(core, store, move |store| {
+        let path = store.newest_run("zero", &name).ok().flatten()?;
+        Some(store.read_journal::<LinearLog>(&path).ok()?.log)
+    })?)
 }
 
 /// Standard uncertainty of the zero that `axis` has kept over a start of this program, which remembers none.
@@ -36,7 +46,10 @@ pub(super) fn kept_since(
     if !asks || !kept_zero::is_proved(core, axis) || !core.is_zeroed(axis) {
         return Ok(remembered);
     }
-    let log = newest_zero(&core.config.machine.store(), axis);
+    let Some(store) = kept_zero::store_of(core) else {
+        return Ok(remembered);
+    };
+    let log = newest_zero(core, &store, axis)?;
     let zero = log.and_then(|mut log| log.zeros.pop());
     if zero.is_none() {
         core.observer().warning(&format!(

@@ -20,8 +20,8 @@ use crate::linear::earlier_zero::newest_zero;
 use crate::linear::stage::{LinearStage, gantry_of};
 use crate::linear::zero::{Begins, to_limit_switch};
 use crate::linear::{GantryConfig, LinearEntry, LinearLog, RotationEntry, Zeroed};
-use crate::run::{missing, note_failure};
-use crate::store::{Journal, Store};
+use crate::run::{missing, note_failure, settle};
+use crate::store::Store;
 
 /// A gantry that was zeroed.
 #[derive(Clone, Debug)]
@@ -50,19 +50,22 @@ impl LinearStage<'_> {
     pub fn zero_gantry(&mut self, store: &Store) -> Result<GantryZeroed, Failure> {
         let own = gantry_of(self.core.config, self.axis);
         let (name, gantry) = own.ok_or_else(|| missing(self.axis, "gantry"))?;
-        let previous = newest_zero(store, name).and_then(|mut log| log.rotations.pop());
-        let mut journal = Journal::<LinearLog>::create(&store.runs(), &self.zero_header(name))?;
+        let previous = newest_zero(&mut self.core, store, name)?;
+        let previous = previous.and_then(|mut log| log.rotations.pop());
+        let mut journal = store.create_journal::<LinearLog>(&self.zero_header(name))?;
+        settle(&mut self.core, store)?;
         let found = self.zero_both(gantry, store);
         if found.is_err() {
             // One side alone must not count as if the stage stood straight.
-            for axis in &gantry.axes {
-                self.core.set_zeroed(axis, false)?;
-            }
+            let axes = gantry.axes.each_ref();
+            let forgotten = axes.map(|axis| self.core.set_zeroed(axis, false));
+            forgotten.into_iter().collect::<Result<(), _>>()?;
         }
         let sides = found.inspect_err(|failure| note_failure(&mut journal, failure))?;
         let entry = self.rotation_entry(gantry, &sides);
         journal.write(&LinearEntry::Rotation(entry.clone()))?;
         journal.complete()?;
+        settle(&mut self.core, store)?;
         Ok(GantryZeroed {
             name: name.to_owned(),
             sides,

@@ -217,7 +217,6 @@ impl LinearStage<'_> {
         for it in SyncsEntry::of(bus_figures(self.core.machine)) {
             session.journal.write(&LinearEntry::Syncs(it))?;
         }
-        session.journal.complete()?;
         session.journal.flush_to_disk()?;
         self.core.leave_instrument();
         let environment = mean_environment(&runs.points);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use compensator::hall_zero::{
     HallPoint, HallSeries, Pass, PlanError, Settings, ZeroPlan, plan_zero,
 };
-use machine::records::{StoreError, write_new_or_replace};
+use machine::ask_disk;
 use units::Metres;
 
 use crate::assemble;
@@ -56,7 +56,10 @@ impl LinearStage<'_> {
         let path = store
             .runs()
             .join(format!("{stamp}-sweep-{}.csv", self.axis));
-        keep(&path, &sweep)?;
+        let (to, text) = (path.clone(), sweep.to_csv());
+        ask_disk(&mut self.core, store, move |store| {
+            store.write_report(&to, &text)
+        })??;
         planned(self.core.config, self.axis, &sweep, &path)
     }
 
@@ -73,10 +76,6 @@ impl LinearStage<'_> {
         }
         HallSeries::new(points).map_err(|source| Failure::Data(Box::new(source)))
     }
-}
-
-fn keep(path: &Path, sweep: &HallSeries) -> Result<(), StoreError> {
-    write_new_or_replace(path, sweep.to_csv().as_bytes())
 }
 
 /// What `sweep`, kept at `path`, proposes for the zero of `axis`.

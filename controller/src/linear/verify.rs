@@ -8,7 +8,6 @@ use compensator::iso230::{self, Figures};
 use units::{Approach, Metres, Short};
 
 use crate::failure::{Failure, in_use_text};
-use crate::linear::calibrate::open_journal;
 use crate::linear::course::ROUNDING;
 use crate::linear::measure::{MeasureOptions, Measured, series_of};
 use crate::linear::memory::Untried;
@@ -17,11 +16,10 @@ use crate::linear::record::{CombinedRecord, PlaceRecord};
 use crate::linear::run_plan::{PlannedRun, of_verification, plan_of, speed_of};
 use crate::linear::stage::LinearStage;
 use crate::linear::{CriterionEntry, LinearEntry, LinearLog};
-use crate::run::{missing, note_failure};
+use crate::run::{missing, note_failure, settle};
 use crate::store::{Store, short};
 use crate::worse::likely_cause;
-use machine::Stage;
-use machine::records::read_journal;
+use machine::{Stage, ask_disk};
 
 /// Between instrument and encoder; a stage as found may be this wrong over its whole travel.
 const SCALE_LIMIT_PPM: f64 = 1000.0;
@@ -120,12 +118,8 @@ impl LinearStage<'_> {
         // Before the header, which says who measures.
         self.core.use_instrument(&plan.instrument)?;
         let header = self.journal_header("verify", &plan, options.calibration.clone());
-        let (mut journal, earlier) = open_journal(
-            store,
-            &header,
-            options.resume.as_ref(),
-            self.core.config_hash,
-        )?;
+        let resume = options.resume.as_ref();
+        let (mut journal, earlier) = self.open_journal(store, &header, resume)?;
         let tolerance = Metres::from_um(config.accuracy_tolerance_um);
         let uncertainty: Vec<UncertaintyAtTarget> = match options.compensated {
             true => plan.targets.iter().map(|it| self.at_target(*it)).collect(),
@@ -139,6 +133,8 @@ impl LinearStage<'_> {
         let measured = self
             .measure_runs(&plan, measuring, &mut journal, earlier)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        journal.complete()?;
+        settle(&mut self.core, store)?;
         let verified = Verified {
             figures: iso230::evaluate(&measured.series()?)?,
             journal: journal.path().to_owned(),
@@ -260,7 +256,7 @@ impl LinearStage<'_> {
     }
 
     /// How good the axis would be without `made`: as what would be in use then was last verified, or as found.
-    fn before(&self, store: &Store, made: &Untried) -> Result<Option<Before>, Failure> {
+    fn before(&mut self, store: &Store, made: &Untried) -> Result<Option<Before>, Failure> {
         let found = made.as_found.map(|accuracy| Before {
             accuracy,
             what: "as found".into(),
@@ -270,7 +266,10 @@ impl LinearStage<'_> {
         let Some(earlier) = newest_first.find(|id| self.usable(store, id).is_ok()) else {
             return Ok(found);
         };
-        let recorded = recorded_accuracy(store, self.axis, earlier)?;
+        let (axis, id) = (self.axis.to_owned(), earlier.clone());
+        let recorded = ask_disk(&mut self.core, store, move |store| {
+            recorded_accuracy(store, &axis, &id)
+        })??;
         let recorded = recorded.map(|accuracy| Before {
             accuracy,
             what: format!(
@@ -301,6 +300,7 @@ impl LinearStage<'_> {
         if let Some(usable) = found {
             self.use_calibration(usable);
         }
+        settle(&mut self.core, store)?;
         Ok(in_use)
     }
 }
@@ -321,7 +321,8 @@ fn recorded_accuracy(store: &Store, axis: &str, id: &str) -> Result<Option<Metre
     names.sort_unstable();
     let newest_first = names.iter().rev();
     let mut accuracies = newest_first.filter_map(|name| {
-        let journal = read_journal::<LinearLog>(&store.runs().join(name)).ok()?;
+        let path = store.runs().join(name);
+        let journal = store.read_journal::<LinearLog>(&path).ok()?;
         let header = &journal.header;
         let is_whole = journal.log.closures.len() == header.runs as usize;
         let is_its = header.axis == axis && header.calibration.as_deref() == Some(id);

@@ -31,7 +31,7 @@ use crate::linear::{HallSweepEntry, ZeroEntry};
 use crate::linear::{LinearEntry, LinearLog};
 use crate::made_by::made_by;
 use crate::run::utc_now;
-use crate::run::{missing, note_failure};
+use crate::run::{missing, note_failure, settle};
 use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store};
 use machine::{STOP_LIMIT, Stage};
 
@@ -104,14 +104,17 @@ impl LinearStage<'_> {
         let config = self.config.zero.clone();
         let config = config.ok_or_else(|| missing(self.axis, "zero"))?;
         self.core.set_zeroed(self.axis, false)?;
-        let previous = newest_zero(store, self.axis).and_then(|mut log| log.zeros.pop());
-        let mut journal = Journal::create(&store.runs(), &self.zero_header(self.axis))?;
+        let previous = newest_zero(&mut self.core, store, self.axis)?;
+        let previous = previous.and_then(|mut log| log.zeros.pop());
+        let mut journal = store.create_journal(&self.zero_header(self.axis))?;
+        settle(&mut self.core, store)?;
         let found = self
             .find_zero(&config, &mut journal, begins)
             .map_err(|failure| homing::before_zero(&self.core, self.axis, failure));
         let (outcome, estimate, entry, flat) =
             found.inspect_err(|failure| note_failure(&mut journal, failure))?;
         journal.complete()?;
+        settle(&mut self.core, store)?;
         self.memory.course.zero = Some(estimate.standard_uncertainty);
         Ok(Zeroed {
             estimate,

@@ -10,6 +10,7 @@ use crate::platform::mistaken::{Judged, Permitted};
 use crate::platform::moves::PoseMoved;
 use crate::platform::state::{difference, largest_error};
 use crate::platform::verify::{PlatformVerified, PoseChecked};
+use crate::run::settle;
 use crate::store::{Store, short};
 
 /// Standard uncertainties that a difference must have: of a hundred platforms that only shake some two are taken for
@@ -104,6 +105,7 @@ impl AlignmentPlatform<'_> {
                 in_use.extend(store.retire(&axis)?.as_deref().map(short));
             }
         }
+        settle(&mut self.core, store)?;
         // What does not fit any more is said when somebody uses it.
         let _ = self.load_active(store);
         let named = (!in_use.is_empty()).then(|| in_use.join(", "));

@@ -23,7 +23,7 @@ use crate::platform::zero::DATUM_LOOKS;
 use crate::platform::{LostMotionRule, PlatformCalibrateConfig, ScrewCompensationConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
 use crate::platform::{ScrewContent, ScrewMethodName, StrokeEntry};
-use crate::run::{CalibrateOptions, note_failure, utc_now};
+use crate::run::{CalibrateOptions, is_used_by, note_failure, settle, utc_now};
 use crate::store::ClosureEntry;
 use crate::store::{CalibrationRecord, Journal, RecordHead, Store};
 use machine::Stage;
@@ -134,7 +134,9 @@ impl AlignmentPlatform<'_> {
         let done = self
             .measure_screws(&plan, &mut journal, &mut sightings)
             .and_then(|(strokes, closure)| {
+                settle(&mut self.core, store)?;
                 let screws = self.fit_and_store(store, &journal, &plan, &strokes)?;
+                settle(&mut self.core, store)?;
                 if !options.aside {
                     self.use_screws(store, &screws)?;
                 }
@@ -144,6 +146,7 @@ impl AlignmentPlatform<'_> {
             .map_err(|it| self.explained(it, &sightings))
             .inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
+        settle(&mut self.core, store)?;
         Ok(PlatformCalibrated {
             screws,
             journal: journal.path().to_owned(),
@@ -393,14 +396,23 @@ impl AlignmentPlatform<'_> {
 
     /// Only when all of them are on the disk.
     fn use_screws(&mut self, store: &Store, calibrated: &[ScrewCalibrated]) -> Result<(), Failure> {
+        let mut stored = Ok(());
+        for screw in calibrated {
+            let used = store.activate(&screw.axis, &screw.id);
+            let used = used.map_err(Failure::from);
+            let used = used.and_then(|()| settle(&mut self.core, store));
+            if !is_used_by(&used) {
+                return used;
+            }
+            stored = stored.and(used);
+        }
         for (at, screw) in calibrated.iter().enumerate() {
-            store.activate(&screw.axis, &screw.id)?;
             let compensation = self.prepare_screw(at, screw.model.clone())?;
             let state = &mut self.state.screws[at];
             state.compensation = Some(compensation);
             state.calibration = Some(screw.id.clone());
         }
-        Ok(())
+        stored
     }
 
     /// The screws for which `store` has no active calibration. Asks no device.

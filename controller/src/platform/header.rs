@@ -7,15 +7,15 @@ use crate::made_by::made_by;
 use crate::platform::ArrangementEntry;
 use crate::platform::handle::AlignmentPlatform;
 use crate::platform::{PlatformEntry, PlatformLog};
-use crate::run::utc_now;
+use crate::run::{settle, utc_now};
 use crate::store::{
     IdentityRecord, InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store,
 };
 
 impl AlignmentPlatform<'_> {
-    /// A journal of the platform with its first two lines.
+    /// A journal of the platform with its first two lines; it is on the disk when this returns.
     pub(crate) fn journal_header(
-        &self,
+        &mut self,
         store: &Store,
         verb: &str,
         runs: u32,
@@ -23,7 +23,7 @@ impl AlignmentPlatform<'_> {
         tolerance: Option<Metres>,
     ) -> Result<Journal<PlatformLog>, Failure> {
         let header = self.header(verb, runs, calibration)?;
-        let mut journal = Journal::create(&store.runs(), &header)?;
+        let mut journal = store.create_journal(&header)?;
         let screws = &self.state.screws;
         journal.write(&PlatformEntry::Arrangement(ArrangementEntry {
             axes: screws.iter().map(|it| it.axis.clone()).collect(),
@@ -31,6 +31,7 @@ impl AlignmentPlatform<'_> {
             tolerance_m: tolerance.map(Metres::value),
             camera_u: tolerance.map(|_| self.camera_u().into()),
         }))?;
+        settle(&mut self.core, store)?;
         Ok(journal)
     }
 

@@ -16,7 +16,7 @@ use crate::platform::look::SeenPose;
 use crate::platform::state::{difference, largest_error};
 use crate::platform::{AlignConfig, PlatformConfig};
 use crate::platform::{PlatformEntry, PlatformLog};
-use crate::run::note_failure;
+use crate::run::{note_failure, settle};
 use crate::store::{Journal, Store};
 use machine::Stage;
 
@@ -145,6 +145,7 @@ impl AlignmentPlatform<'_> {
         let checked = self
             .check_poses(&targets, compensated, &mut journal)
             .inspect_err(|failure| note_failure(&mut journal, failure))?;
+        settle(&mut self.core, store)?;
         let PoseFigures {
             largest,
             rms,

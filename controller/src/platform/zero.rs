@@ -45,6 +45,7 @@ impl AlignmentPlatform<'_> {
         let at_s = self.core.now().seconds();
         journal.write(&PlatformEntry::Pose(PoseEntry::looked(datum, at_s)))?;
         journal.complete()?;
+        crate::run::settle(&mut self.core, store)?;
         Ok(PlatformZeroed {
             datum,
             journal: journal.path().to_owned(),

@@ -4,6 +4,7 @@ mod align;
 mod answering;
 mod ask;
 mod before;
+mod behind;
 mod belongs;
 mod budget;
 mod cal;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use machine::records::{AnyLog, Store, StoreError, read_journal};
+use machine::records::{AnyLog, Store, read_journal};
 
 use crate::Failure;
 use crate::program::NEWEST_RUN;
@@ -66,12 +66,11 @@ pub(crate) fn resumable<R>(
 /// Whether the run of `journal` goes on once the cause of `failure` is gone. What refuses the measured values refuses
 /// them again.
 fn goes_on(failure: &Failure, journal: &Path) -> bool {
-    let is_disk = matches!(
-        failure,
-        Failure::File { .. } | Failure::Store(StoreError::Io { .. })
-    );
     let is_incomplete = || read_journal::<AnyLog>(journal).is_ok_and(|read| !read.complete);
-    failure.is_stop() || (is_disk || failure.stops_the_machine()) && is_incomplete()
+    let is_file = matches!(failure, Failure::File { .. });
+    // A run whose measurement is complete is stored by the one that goes on.
+    let is_kept = failure.is_stop() || failure.is_of_disk();
+    is_kept || (is_file || failure.stops_the_machine()) && is_incomplete()
 }
 
 #[cfg(test)]
@@ -121,6 +120,21 @@ mod tests {
         assert!(!said.contains("--resume"), "{said}");
         let said = stopped(&store, true, Failure::ScanMismatch { wrong: 1 });
         assert!(!said.contains("--resume"), "{said}");
+    }
+
+    #[test]
+    fn a_run_that_the_disk_ends_goes_on() {
+        let (_folder, store) = store();
+        let source = std::io::Error::from_raw_os_error(28);
+        let full = machine::records::StoreError::Unsynced {
+            path: "x".into(),
+            source,
+        };
+        let said = stopped(&store, true, full.into());
+        assert!(said.contains("--resume"), "{said}");
+        let hangs = machine::records::DiskFailure::Behind { waiting: 7 };
+        let said = stopped(&store, true, machine::Failure::from(hangs).into());
+        assert!(said.contains("--resume"), "{said}");
     }
 
     #[test]

@@ -88,7 +88,11 @@ pub(crate) fn run(
             let own = Arc::new(session.lease);
             // It is opened once.
             let _ = lease.set(Arc::downgrade(&own));
-            Ok((session.machine, session.store, Box::new(own)))
+            Ok((
+                session.machine,
+                session.store,
+                Box::new((session.records, own)),
+            ))
         }),
         // Pages of journals of any kind: whatever has worked on this machine left its own.
         teller: Teller {

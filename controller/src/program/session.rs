@@ -3,13 +3,17 @@
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, ErrorKind};
 use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use drivers::transport::Transport;
 use drivers::transport::record::Recorder;
-use machine::records::Lease;
+use machine::kept_zero;
+use machine::records::{DiskPace, Lease};
 
 use crate::config::{self, Loaded};
 use crate::ports::{self, Overrides, Use};
+use crate::program::behind::Behind;
 use crate::program::output::Output;
 use crate::program::progress::Bars;
 use crate::program::signals::stop_on_signals;
@@ -24,8 +28,25 @@ const STILL: [&str; 3] = ["align", "reset", "scan"];
 pub(crate) struct Session {
     pub(crate) machine: Machine,
     pub(crate) store: Store,
+    /// Dropped before the lease is given back.
+    pub(crate) records: Records,
     /// Held for as long as the machine is used.
     pub(crate) lease: Lease,
+}
+
+/// The records of a machine; what was ordered at last is waited for when this is dropped.
+pub(crate) struct Records(Store);
+
+/// A disk that hangs keeps nobody waiting at the end.
+const AT_THE_END: Duration = Duration::from_secs(1);
+
+impl Drop for Records {
+    fn drop(&mut self) {
+        let begun = Instant::now();
+        while self.0.waiting() > 0 && begun.elapsed() < AT_THE_END {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
 }
 
 impl Session {
@@ -53,18 +74,26 @@ impl Session {
         });
         let pace = args.pace(verb)?;
         loaded.patience = pace.patience();
+        let of_disk = pace.of_disk();
+        let ordered = store.ordered(of_disk);
+        let store = ordered.map_err(|source| Failure::File {
+            path: store.root().to_owned(),
+            source,
+        })?;
         let transport = ports::open(&loaded.config, &overrides, purpose, pace)?;
         output.detail(|| {
             let names: Vec<String> = assemble::ports(&loaded.config).into_keys().collect();
             format!("{}: open, nothing was sent yet", names.join(", "))
         });
-        let transport = recorded(transport, args, &loaded)?;
+        let transport = recorded(transport, args, &loaded, of_disk)?;
         let mut machine = Machine::new(&loaded, transport);
+        kept_zero::keep(&mut machine, store.clone(), loaded.text.as_str().to_owned());
         machine.in_real_time();
         machine.observe(Box::new(output.bars(Bars::new)));
         stop_on_signals(&machine.stop_request())?;
         Ok(Self {
             machine,
+            records: Records(store.clone()),
             store,
             lease,
         })
@@ -75,6 +104,7 @@ fn recorded(
     transport: impl Transport + 'static,
     args: &MachineArgs,
     loaded: &Loaded,
+    of_disk: DiskPace,
 ) -> Result<Box<dyn Transport>, Failure> {
     let Some(path) = &args.record else {
         return Ok(Box::new(transport));
@@ -83,7 +113,8 @@ fn recorded(
         path: path.clone(),
         source,
     };
-    let log = BufWriter::new(new_file(path)?);
+    let log = Behind::new(new_file(path)?, of_disk).map_err(failed)?;
+    let log = BufWriter::new(log);
     let ports = assemble::ports(&loaded.config);
     let names: Vec<_> = ports
         .iter()

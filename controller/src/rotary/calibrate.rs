@@ -18,8 +18,9 @@ use crate::rotary::subject::{Subject, plate_record};
 use crate::rotary::table::RotaryTable;
 use crate::rotary::unturned::{Unturned, unturned};
 use crate::rotary::{PlateEntry, RotaryContent};
-use crate::run::{CalibrateOptions, utc_now};
+use crate::run::{CalibrateOptions, is_used_by, settle, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store};
+use machine::read_ahead;
 
 /// So many placements are needed before one can be told to be misplaced by the others.
 const JUDGED_MIN: usize = 3;
@@ -76,23 +77,38 @@ impl RotaryTable<'_> {
         read: &mut Read<'_>,
     ) -> Result<RotaryCalibrated, Failure> {
         self.core.require_zeroed(self.axis)?;
+        if let Some(journal) = &options.resume {
+            read_ahead(&mut self.core, store, journal.clone())?;
+        }
         let mut it = Calibration::begin(self.subject(), store, options)?;
-        let evaluated = self.read_all(&mut it, read).and_then(|()| it.evaluate());
+        settle(&mut self.core, store)?;
+        let evaluated = self
+            .read_all(store, &mut it, read)
+            .and_then(|()| it.evaluate());
         let solution = evaluated.inspect_err(|failure| {
             it.note(failure);
             // Offsets of a run without a calibration mean nothing to a verification.
             self.memory.plate_at = None;
         })?;
+        settle(&mut self.core, store)?;
         let (calibrated, in_use) = it.store(store, solution)?;
-        if calibrated.is_in_use {
+        let stored = settle(&mut self.core, store);
+        if calibrated.is_in_use && is_used_by(&stored) {
             self.memory.calibration = Some(in_use);
         }
-        Ok(calibrated)
+        stored.map(|()| calibrated)
     }
 
-    fn read_all(&mut self, it: &mut Calibration<'_>, read: &mut Read<'_>) -> Result<(), Failure> {
+    fn read_all(
+        &mut self,
+        store: &Store,
+        it: &mut Calibration<'_>,
+        read: &mut Read<'_>,
+    ) -> Result<(), Failure> {
         while let Some(due) = it.due()? {
             let placed = self.read_due(read, &it.run, &due, &mut it.journal)?;
+            // Nobody places the plate again for what the disk has not kept.
+            settle(&mut self.core, store)?;
             it.take(placed);
         }
         Ok(())

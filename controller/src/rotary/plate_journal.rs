@@ -8,7 +8,7 @@ use crate::rotary::subject::Subject;
 use crate::rotary::{PlacementEntry, PlateEntry, PlateLog, PlatePlanEntry};
 use crate::run::note_failure;
 use crate::store::{
-    Journal, JournalHeader, Log, Store, StoreError, first_difference, not_resumable, read_journal,
+    Journal, JournalHeader, Log, Store, StoreError, first_difference, not_resumable,
 };
 
 /// A journal that is being written, with what it says so far: what a person reads goes on from there.
@@ -28,8 +28,8 @@ impl PlateJournal {
         subject: &Subject<'_>,
     ) -> Result<Self, Failure> {
         let (journal, log) = match resume {
-            None => (Journal::create(&store.runs(), header)?, PlateLog::default()),
-            Some(path) => continued(path, header, plan, subject)?,
+            None => (store.create_journal(header)?, PlateLog::default()),
+            Some(path) => continued(store, path, header, plan, subject)?,
         };
         let is_planned = log.plan.is_some();
         let mut it = Self {
@@ -91,6 +91,7 @@ impl PlateJournal {
 }
 
 fn continued(
+    store: &Store,
     path: &Path,
     header: &JournalHeader,
     plan: &PlatePlanEntry,
@@ -99,10 +100,10 @@ fn continued(
     let mut header = header.clone();
     if plan.sighted.is_some() {
         // Some of it may be read with the machine, and some without.
-        let before = read_journal::<PlateLog>(path)?.header.drive;
+        let before = store.read_journal::<PlateLog>(path)?.header.drive;
         header.drive = subject.drive_beside(&before);
     }
-    let (journal, read) = Journal::<PlateLog>::resume(path, &header, subject.hash)?;
+    let (journal, read) = store.resume_journal::<PlateLog>(path, &header, subject.hash)?;
     if let Some(before) = &read.log.plan
         && let Some(it) = first_difference(before, plan)
     {

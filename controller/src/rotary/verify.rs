@@ -29,10 +29,11 @@ use crate::rotary::plate_run::{DuePlacement, PlateRun};
 use crate::rotary::subject::Subject;
 use crate::rotary::table::RotaryTable;
 use crate::rotary::{JudgedEntry, PlateEntry, RotaryVerifyConfig};
-use crate::run::missing;
+use crate::run::{missing, settle};
 use crate::store::{Store, short};
 use crate::worse::likeliest_cause;
 use machine::Stage;
+use machine::read_ahead;
 
 /// How much better another place of the plate must fit.
 const BETTER: f64 = 3.0;
@@ -157,11 +158,16 @@ impl RotaryTable<'_> {
     ) -> Result<RotaryVerified, Failure> {
         self.core.require_zeroed(self.axis)?;
         let known = self.memory.calibration.clone();
+        if let Some(journal) = resume {
+            read_ahead(&mut self.core, store, journal.clone())?;
+        }
         let mut it = Verification::begin(self.subject(), store, (compensated, known), resume)?;
+        settle(&mut self.core, store)?;
         let due = it.due();
         let placed = self.read_due(read, &it.run, &due, &mut it.journal);
         let placed = placed.inspect_err(|failure| it.journal.note(failure))?;
         let verified = it.judge(store, &placed);
+        settle(&mut self.core, store)?;
         verified.inspect_err(|failure| {
             if let Some(RotaryFailure::MadeWorse { .. }) = failure.of_kind() {
                 self.memory.calibration = None;

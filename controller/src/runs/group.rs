@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use machine::Stage;
+use machine::ask_disk;
 use machine::records::Store;
 
 use super::choice::{Change, Choice, chosen_among, write};
@@ -288,15 +289,22 @@ impl Group {
         store: &Store,
         choice: &Choice,
     ) -> Result<Vec<Change>, Failure> {
-        let changes = self.changes(store, choice)?;
-        if matches!(choice, Choice::Clear(_)) {
-            // Without it the others may be of no use: that is said when they are loaded.
-            write(store, &changes)?;
-            return Ok(changes);
+        let (group, wanted) = (self.clone(), choice.clone());
+        let changes = ask_disk(machine, store, move |store| {
+            let changes = group.changes(store, &wanted)?;
+            store.hold_calibrations(changes.iter().filter_map(|change| change.id.as_deref()));
+            Ok::<_, Failure>(changes)
+        })??;
+        // Without what is cleared the others may be of no use: that is said when they are loaded.
+        let is_loaded = !matches!(choice, Choice::Clear(_));
+        if is_loaded {
+            (self.runs.usable)(machine, store, &changes)?;
         }
-        (self.runs.usable)(machine, store, &changes)?;
-        write(store, &changes)?;
-        self.load(machine, store)?;
+        let written = changes.clone();
+        ask_disk(machine, store, move |store| write(store, &written))??;
+        if is_loaded {
+            self.load(machine, store)?;
+        }
         Ok(changes)
     }
 

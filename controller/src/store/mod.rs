@@ -10,9 +10,10 @@ pub(crate) mod record_tests;
 #[cfg(test)]
 pub(crate) mod test_run;
 
+#[cfg(test)]
+pub(crate) use machine::records::read_journal;
 pub(crate) use machine::records::{
     CalibrationRecord, ClosureEntry, Content, EnvironmentRecord, IdentityRecord, InstrumentRecord,
-    Journal, JournalHeader, Log, RecordHead, SCHEMA_VERSION, Store, StoreError, read_journal,
-    short,
+    Journal, JournalHeader, Log, RecordHead, SCHEMA_VERSION, Store, StoreError, short,
 };
 pub(crate) use machine::records::{first_difference, not_resumable};

@@ -1,6 +1,7 @@
 //! Whether a calibration makes three axes better, by what a verification has seen: without it the line would have been
 //! off by what was seen and by what was taken away.
 
+use machine::ask_disk;
 use units::Metres;
 
 use crate::failure::Failure;
@@ -15,7 +16,7 @@ impl WorkVolume<'_> {
     /// The calibration called `geometry`, with which the line is out of tolerance and worse than without, is taken out
     /// of use, and with it the references that count from it.
     pub(super) fn judge_benefit(
-        &self,
+        &mut self,
         store: &Store,
         geometry: Option<&str>,
         verified: &VolumetricVerified,
@@ -37,7 +38,8 @@ impl WorkVolume<'_> {
             .iter()
             .map(|(known, left)| (known.value(), left.value()))
             .collect();
-        let in_use = fall_back(store, id)?;
+        let own = id.to_owned();
+        let in_use = ask_disk(&mut self.core, store, move |store| fall_back(store, &own))??;
         Err(Failure::MadeWorse {
             axis: "x, y, z".into(),
             calibration: short(id),

@@ -163,7 +163,7 @@ impl WorkVolume<'_> {
     /// When a stretch that was gone along was not seen by a detector; when the store cannot be
     /// written.
     pub fn keep_part(
-        &self,
+        &mut self,
         store: &Store,
         mover: Mover,
         part: FirstPart,

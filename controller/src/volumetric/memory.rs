@@ -11,7 +11,7 @@ use compensator::volumetric::online::{Coverage, Displacement, StateMap};
 use units::{Metres, Radians};
 
 use crate::failure::Failure;
-use crate::run::utc_now;
+use crate::run::{settle, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::correction::{bends, lever};
 use crate::volumetric::handle::WorkVolume;
@@ -117,7 +117,7 @@ impl WorkVolume<'_> {
 
     /// Stores and activates what was recorded with `records` in use.
     pub(super) fn keep_memory(
-        &self,
+        &mut self,
         store: &Store,
         memory: MemoryName,
         records: &VolumetricRecords,
@@ -138,7 +138,10 @@ impl WorkVolume<'_> {
             ..self.this_volume(memory_pointer(memory))?
         };
         let id = store.save(&CalibrationRecord { head, content })?;
+        // What is used was stored before.
+        settle(&mut self.core, store)?;
         store.activate(memory_pointer(memory), &id)?;
+        settle(&mut self.core, store)?;
         let foreign = foreign_second(store)?;
         Ok(Remembered {
             id,

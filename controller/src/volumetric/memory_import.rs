@@ -8,7 +8,7 @@ use units::{Metres, Radians, Short};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
-use crate::run::{measured_elsewhere, utc_now};
+use crate::run::{measured_elsewhere, settle, utc_now};
 use crate::runs::DataFile;
 use crate::store::{CalibrationRecord, RecordHead, Store};
 use crate::volumetric::handle::WorkVolume;
@@ -54,7 +54,7 @@ impl WorkVolume<'_> {
     /// # Errors
     /// Those of [`import`].
     pub(crate) fn import_memory(
-        &self,
+        &mut self,
         store: &Store,
         file: &DataFile,
     ) -> Result<Remembered, Failure> {
@@ -64,7 +64,9 @@ impl WorkVolume<'_> {
             instrument: measured_elsewhere(),
             ..self.this_volume(memory_pointer(MemoryName::First))?
         };
-        import(self.core.config, store, head, (&file.text, &file.name))
+        let kept = import(self.core.config, store, head, (&file.text, &file.name))?;
+        settle(&mut self.core, store)?;
+        Ok(kept)
     }
 }
 

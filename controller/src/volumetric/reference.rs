@@ -16,7 +16,7 @@ use units::{Celsius, Metres, Quantity, Radians, Time};
 
 use crate::config::MachineConfig;
 use crate::failure::Failure;
-use crate::run::{require_certified, utc_now};
+use crate::run::{require_certified, settle, utc_now};
 use crate::store::{CalibrationRecord, RecordHead, Store, short};
 use crate::volumetric::config::THERMOMETERS;
 use crate::volumetric::handle::WorkVolume;
@@ -141,7 +141,10 @@ impl WorkVolume<'_> {
         let references = self.take_references()?;
         check_warmth(&config, &geometry, &then, &references.temperatures)?;
         let kept = self.keep_references(store, &geometry, references, "reference")?;
+        // What is used was stored before.
+        settle(&mut self.core, store)?;
         store.activate(REFERENCES, &kept.id)?;
+        settle(&mut self.core, store)?;
         Ok(kept)
     }
 

@@ -309,7 +309,7 @@ fn require_shape(memory: Option<MemoryName>, files: &[DataFile]) -> Result<&Data
 fn import(work: Work<'_>, memory: MemoryName, files: &[DataFile]) -> Result<Found, Failure> {
     let words = work.words::<VolumetricTeller>();
     let file = require_shape(Some(memory), files)?;
-    let volume = work.machine.volumetric()?;
+    let mut volume = work.machine.volumetric()?;
     let kept = volume.import_memory(work.store, file)?;
     Ok(Found {
         figures: json!({"memory": kept.id, "foreign_second": kept.foreign}),

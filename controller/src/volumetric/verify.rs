@@ -8,7 +8,7 @@ use compensator::volumetric::identify::Reading;
 use units::Metres;
 
 use crate::failure::Failure;
-use crate::run::note_failure;
+use crate::run::{note_failure, settle};
 use crate::store::{Journal, Store};
 use crate::volumetric::handle::WorkVolume;
 use crate::volumetric::inputs::place_of_temperature;
@@ -165,7 +165,7 @@ impl WorkVolume<'_> {
         let own = self.verify_config()?;
         let (mover, geometry) = self.mover_by(store, by)?;
         let header = self.header("verify", geometry.clone())?;
-        let mut journal = Journal::create(&store.runs(), &header)?;
+        let mut journal = store.create_journal(&header)?;
         journal.write(&VolumeEntry::VolumeCheck(VolumeCheckEntry {
             state: by.text().to_owned(),
             from_m: metres(point_of_mm(own.from_mm)),
@@ -173,10 +173,12 @@ impl WorkVolume<'_> {
             tool_m: metres(point_of_mm(config.tool_offset_mm)),
             limit_m: Metres::from_um(own.limit_um).value(),
         }))?;
+        settle(&mut self.core, store)?;
         let points = self
             .read_verified(&config, &own, mover, operator, &mut journal)
             .inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
+        settle(&mut self.core, store)?;
         let path = journal.path().to_owned();
         let verified = judged(points, Metres::from_um(own.limit_um), path);
         // By the tables alone is how a machine is compared that also has detectors: their part is left out on purpose.

@@ -72,6 +72,14 @@ pub(super) fn awaited(descriptor: BorrowedFd<'_>) -> bool {
     }
 }
 
+/// Whether a write that failed so says that the device is not there any more.
+pub(super) const fn is_gone(errno: Errno) -> bool {
+    matches!(
+        errno,
+        Errno::EIO | Errno::ENODEV | Errno::ENXIO | Errno::EBADF | Errno::EPIPE
+    )
+}
+
 /// The operating system's refusal as a [`SendError`].
 pub(super) const fn system(port: Port, errno: Errno) -> SendError {
     match errno {

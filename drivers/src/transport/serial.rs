@@ -17,7 +17,7 @@ use wire::{Input, LinkState, Payload, Port};
 
 use super::SendError;
 use super::clock::Clock;
-use super::live_port::{LivePort, awaited, system};
+use super::live_port::{LivePort, awaited, is_gone, system};
 use super::open_line::OpenLine;
 use super::os;
 
@@ -500,7 +500,7 @@ impl LivePort for SerialLine {
         }
         self.outbox.send(bytes).map_err(|errno| {
             self.refused += 1;
-            if errno == Errno::EAGAIN {
+            if !is_gone(errno) {
                 return system(port, errno);
             }
             self.lose(self.clock.now());

@@ -12,7 +12,6 @@ mod lines;
 mod start;
 
 use core::time::Duration;
-use nix::errno::Errno;
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
@@ -26,7 +25,7 @@ pub use self::start::SlcanSettings;
 use self::start::Step;
 use super::SendError;
 use super::clock::Clock;
-use super::live_port::{LivePort, system};
+use super::live_port::{LivePort, is_gone, system};
 use super::open_error::OpenError;
 use super::open_line::OpenLine;
 use super::serial::{self, BackOff, Read};
@@ -344,8 +343,9 @@ impl SlcanPort {
                 .lock()
                 .send(Asked::Status, &Command::ReadStatus.emit());
             match sent {
-                Ok(()) | Err(Errno::EAGAIN) => {}
-                Err(_) => self.lose(now),
+                Err(errno) if is_gone(errno) => self.lose(now),
+                // What it does not take now it is asked again.
+                Ok(()) | Err(_) => {}
             }
         }
     }
@@ -423,7 +423,7 @@ impl LivePort for SlcanPort {
             }
             Err(errno) => {
                 self.counts.refused += 1;
-                if errno == Errno::EAGAIN {
+                if !is_gone(errno) {
                     return Err(system(port, errno));
                 }
                 self.lose(self.clock.now());

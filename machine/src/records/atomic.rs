@@ -1,7 +1,6 @@
 //! Writing a file so that a crash at any moment leaves the old one or the new one.
 
 use core::sync::atomic::{AtomicU32, Ordering};
-use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -44,8 +43,12 @@ pub fn replace_file(files: &dyn Files, path: &Path, bytes: &[u8]) -> Result<(), 
     let temporary = create_beside(files, path, mode)?;
     let replaced = write_temporary(files, temporary, path, bytes);
     replaced?;
-    let synced = files.sync_folder(folder);
-    synced.map_err(io_error("flush the folder to disk", folder))
+    files
+        .sync_folder(folder)
+        .map_err(|source| StoreError::Unsynced {
+            path: path.to_owned(),
+            source,
+        })
 }
 
 /// Creates a temporary file in the folder of `path`.
@@ -97,20 +100,28 @@ fn write_temporary(
 /// # Errors
 /// What the operating system says.
 pub fn remove_durably(path: &Path) -> io::Result<()> {
-    match fs::remove_file(path) {
+    remove_file(&OsFiles, path)
+}
+
+/// [`remove_durably`] with these `files`.
+///
+/// # Errors
+/// Those of [`remove_durably`].
+pub fn remove_file(files: &dyn Files, path: &Path) -> io::Result<()> {
+    match files.remove(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}
     }
     // Also where it is gone already: whoever removed it may have died before this.
-    match File::open(path.parent().unwrap_or(Path::new("."))) {
+    match files.sync_folder(path.parent().unwrap_or(Path::new("."))) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        folder => folder?.sync_all(),
+        synced => synced,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs::Permissions;
+    use std::fs::{self, Permissions};
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::disk_failure::DiskFailure;
 use super::sound::Unsound;
 use super::{SCHEMA_VERSION, short};
 
@@ -17,6 +18,31 @@ pub enum StoreError {
         /// What was tried.
         action: &'static str,
         /// With which file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The thread of the records took or did nothing.
+    #[error(transparent)]
+    Disk(#[from] DiskFailure),
+    /// The calibration is in use, which may be lost again.
+    #[error(
+        "{}: the new calibration is in use; that may not outlast a power cut, since its folder cannot be flushed to \
+         disk: {source}. Check the disk, then use it again (`truestage cal activate`)", path.display()
+    )]
+    UseUnsynced {
+        /// Which pointer.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// It was written whole and has its name, which may be lost again.
+    #[error(
+        "{}: written whole; it may not outlast a power cut, since its folder cannot be flushed to disk: {source}",
+        path.display()
+    )]
+    Unsynced {
+        /// Which file.
         path: PathBuf,
         /// Why not.
         source: std::io::Error,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::journal::{AnyLog, JournalHeader, read_journal};
+use super::journal::{AnyLog, JournalHeader};
 use super::{Store, StoreError};
 
 /// The newest journal of a verb on an axis, which is not complete.
@@ -27,7 +27,7 @@ impl Store {
         let Some(journal) = self.newest_run(verb, axis)? else {
             return Ok(None);
         };
-        let read = read_journal::<AnyLog>(&journal)?;
+        let read = self.read_journal::<AnyLog>(&journal)?;
         Ok((!read.complete).then_some(InterruptedRun {
             journal,
             header: read.header,

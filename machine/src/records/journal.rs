@@ -5,18 +5,15 @@
 //! when it is read. Every journal records in the same way how a run begins, continues and ends;
 //! what it measured is recorded in the terms of its kind ([`Log`]).
 
-use core::marker::PhantomData;
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::difference::{Difference, first_difference};
-use super::hash::ConfigHash;
+use super::door::Door;
 use super::head::{IdentityRecord, InstrumentRecord};
-use super::line::{json_of, next_line, sealed};
+use super::line::{json_of, next_line};
 use super::regular::open_regular;
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
@@ -154,7 +151,7 @@ impl Log for AnyLog {
 /// How a run begins, goes on and ends: the lines of every journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
-enum Mark {
+pub(super) enum Mark {
     /// First line.
     Header(Box<JournalHeader>),
     /// The run was continued here after an interruption, at that time (UTC, RFC 3339).
@@ -170,125 +167,6 @@ const MARKS: [&str; 4] = ["header", "resumed", "failed", "complete"];
 enum Line<E> {
     Mark(Mark),
     Entry(E),
-}
-
-/// A journal being written, with a log of kind `L`.
-#[derive(Debug)]
-pub struct Journal<L> {
-    path: PathBuf,
-    file: File,
-    log: PhantomData<fn(L)>,
-}
-
-impl<L: Log> Journal<L> {
-    /// Starts a journal in `folder`.
-    ///
-    /// # Errors
-    /// When it cannot be created.
-    pub fn create(folder: &Path, header: &JournalHeader) -> Result<Self, StoreError> {
-        fs::create_dir_all(folder).map_err(io_error("create the folder", folder))?;
-        let stamp = header.started.replace([':', '-'], "");
-        for attempt in 0..10_000_u32 {
-            let name = format!("{stamp}-{}-{}-{attempt:02}.jsonl", header.verb, header.axis);
-            let path = folder.join(name);
-            match OpenOptions::new().append(true).create_new(true).open(&path) {
-                Ok(file) => {
-                    let mut journal = Self::over(path, file);
-                    journal.append(&Mark::Header(Box::new(header.clone())))?;
-                    return Ok(journal);
-                }
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(io_error("create", &path)(error)),
-            }
-        }
-        let taken = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
-        Err(io_error("create a new journal in it", folder)(taken))
-    }
-
-    /// Continues the journal at `path` after its last whole line; `hash` is of the configuration
-    /// that it is continued with.
-    ///
-    /// # Errors
-    /// When it cannot be read or does not describe the same run as `header`.
-    pub fn resume(
-        path: &Path,
-        header: &JournalHeader,
-        hash: &ConfigHash,
-    ) -> Result<(Self, ReadJournal<L>), StoreError> {
-        let mut read = read_journal::<L>(path)?;
-        same_run(path, &read.header, header, hash)?;
-        if read.complete {
-            return Err(StoreError::AlreadyComplete {
-                path: path.to_owned(),
-            });
-        }
-        let file = OpenOptions::new()
-            .append(true)
-            .open(path)
-            .map_err(io_error("open", path))?;
-        file.set_len(read.valid_bytes)
-            .map_err(io_error("cut off its incomplete last line", path))?;
-        let mut journal = Self::over(path.to_owned(), file);
-        journal.append(&Mark::Resumed {
-            at: header.started.clone(),
-        })?;
-        read.failure = None;
-        read.log.keep_whole(&read.header);
-        Ok((journal, read))
-    }
-
-    const fn over(path: PathBuf, file: File) -> Self {
-        let log = PhantomData;
-        Self { path, file, log }
-    }
-
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Appends one entry; it is in the kernel's hands when this returns, so that killing the
-    /// process loses nothing.
-    ///
-    /// # Errors
-    /// When it cannot be written: the run must stop, its points would be lost.
-    pub fn write(&mut self, entry: &L::Entry) -> Result<(), StoreError> {
-        self.append(entry)
-    }
-
-    /// Says why the run failed.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn fail(&mut self, cause: String) -> Result<(), StoreError> {
-        self.append(&Mark::Failed { cause })
-    }
-
-    /// Says that the run is complete, and forces everything to the disk.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn complete(&mut self) -> Result<(), StoreError> {
-        self.append(&Mark::Complete)?;
-        self.flush_to_disk()
-    }
-
-    fn append(&mut self, line: &impl Serialize) -> Result<(), StoreError> {
-        let json = serde_json::to_string(line).expect("plain data always serialises");
-        self.file
-            .write_all(sealed(&json).as_bytes())
-            .map_err(io_error("append to it", &self.path))
-    }
-
-    /// Forces everything to the disk; called where the axis stands and time does not matter.
-    ///
-    /// # Errors
-    /// When the disk refuses.
-    pub fn flush_to_disk(&mut self) -> Result<(), StoreError> {
-        self.file
-            .sync_data()
-            .map_err(io_error("flush it to disk", &self.path))
-    }
 }
 
 /// A journal that was read.
@@ -310,58 +188,24 @@ pub struct ReadJournal<L> {
     pub blake3: String,
 }
 
-fn same_run(
-    path: &Path,
-    old: &JournalHeader,
-    new: &JournalHeader,
-    hash: &ConfigHash,
-) -> Result<(), StoreError> {
-    let text = |a: &str, b: &str| first_difference(a, b);
-    let config_hash = hash.beside(&old.config_hash);
-    let comparisons = [
-        ("verb", text(&old.verb, &new.verb)),
-        ("stage serial", text(&old.stage_serial, &new.stage_serial)),
-        ("configuration hash", text(&old.config_hash, config_hash)),
-        ("axis", text(&old.axis, &new.axis)),
-        ("drive", first_difference(&old.drive, &new.drive)),
-        (
-            "calibration",
-            first_difference(&old.calibration, &new.calibration),
-        ),
-        (
-            "instrument and its corrections",
-            first_difference(&old.instrument.corrections(), &new.instrument.corrections()),
-        ),
-        ("number of runs", first_difference(&old.runs, &new.runs)),
-        ("targets", first_difference(&old.targets_m, &new.targets_m)),
-        (
-            "length of approach",
-            first_difference(&old.approach_m, &new.approach_m),
-        ),
-    ];
-    let different = comparisons
-        .into_iter()
-        .find_map(|(what, it)| Some((what, it?)));
-    different.map_or(Ok(()), |(what, it)| Err(not_resumable(path, what, it)))
-}
-
-/// The error for a journal whose run was another one than would be continued, with where they differ.
-pub fn not_resumable(path: &Path, what: &str, it: Difference) -> StoreError {
-    StoreError::NotResumable {
-        path: path.to_owned(),
-        what: it.in_what(what),
-        expected: it.expected,
-        seen: it.seen,
-    }
-}
-
 /// Reads a journal up to its last whole line.
 ///
 /// # Errors
 /// When it cannot be read, has no header, a line before the last one is damaged, or one says what
 /// cannot be.
 pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
-    journal_of(path, |_| {})
+    journal_of(path, open(path)?, |_| {})
+}
+
+/// The journal at `path`, to be read in pieces.
+fn open(path: &Path) -> Result<impl BufRead, StoreError> {
+    let file = open_regular(path, JOURNAL_MAX).map_err(io_error("read", path))?;
+    Ok(BufReader::new(file))
+}
+
+pub(super) fn read_by<L: Log>(door: &Door, path: &Path) -> Result<ReadJournal<L>, StoreError> {
+    let bytes = door.read(path).map_err(io_error("read", path))?;
+    journal_of(path, &*bytes, |_| {})
 }
 
 /// Reads a journal of whatever kind, and the entry of each whole line of it, marks included: JSON without its
@@ -371,17 +215,16 @@ pub fn read_journal<L: Log>(path: &Path) -> Result<ReadJournal<L>, StoreError> {
 /// Those of [`read_journal`].
 pub fn read_entries(path: &Path) -> Result<(ReadJournal<AnyLog>, Vec<String>), StoreError> {
     let mut whole = Vec::new();
-    let read = journal_of(path, |json| whole.push(json.to_owned()))?;
+    let read = journal_of(path, open(path)?, |json| whole.push(json.to_owned()))?;
     Ok((read, whole))
 }
 
-/// Reads the journal at `path` line by line, and tells `whole` the JSON of each whole line.
-fn journal_of<L: Log>(
+/// Reads a journal line by line, and tells `whole` the JSON of each whole line.
+pub(super) fn journal_of<L: Log>(
     path: &Path,
+    mut file: impl BufRead,
     mut whole: impl FnMut(&str),
 ) -> Result<ReadJournal<L>, StoreError> {
-    let file = open_regular(path, JOURNAL_MAX).map_err(io_error("read", path))?;
-    let mut file = BufReader::new(file);
     let mut read: Option<ReadJournal<L>> = None;
     let mut hash = blake3::Hasher::new();
     let mut valid_bytes = 0;
@@ -401,6 +244,11 @@ fn journal_of<L: Log>(
                 whole(&json.unwrap_or_default());
             }
             Err(_) if is_last => torn = true,
+            // A hole that a power cut has left: nothing behind it was flushed to the disk.
+            Err(_) if line.contains(&0) => {
+                torn = true;
+                break;
+            }
             Err(cause) => {
                 return Err(damaged(path, number, &cause));
             }
@@ -500,6 +348,3 @@ fn damaged(path: &Path, line: usize, cause: &str) -> StoreError {
         cause: cause.into(),
     }
 }
-
-#[cfg(test)]
-mod tests;

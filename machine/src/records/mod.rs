@@ -28,24 +28,35 @@
 
 mod atomic;
 mod content;
+mod copy;
 mod difference;
+mod disk;
+mod disk_failure;
+mod door;
 mod failure;
 pub mod files;
 mod hash;
 mod head;
 mod interrupted;
 mod journal;
+mod journal_file;
+mod journal_writer;
 mod lease;
 mod line;
 mod name;
+mod ordered;
+mod pointer;
 mod regular;
+mod run_name;
 pub mod sound;
 mod store;
 mod thermometers;
 
-pub use atomic::{remove_durably, replace_file, write_new_or_replace};
+pub use atomic::{remove_durably, remove_file, replace_file, write_new_or_replace};
 pub use content::{CalibrationRecord, Content, ContentKind, Glance};
 pub use difference::{Difference, first_difference};
+pub use disk::{Answer, DiskPace};
+pub use disk_failure::DiskFailure;
 pub use failure::{ModelError, StoreError};
 pub use hash::ConfigHash;
 pub use head::{
@@ -53,17 +64,24 @@ pub use head::{
 };
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, JOURNAL_MAX, Journal, JournalHeader, Log, ReadJournal, not_resumable,
-    read_entries, read_journal,
+    AnyLog, ClosureEntry, JOURNAL_MAX, JournalHeader, Log, ReadJournal, read_entries, read_journal,
 };
+pub use journal_writer::{Journal, not_resumable};
 pub use lease::Lease;
 pub use line::{opened, sealed};
 pub use name::short;
+pub(crate) use ordered::Asked;
+pub use pointer::ActivePointer;
 pub use regular::open_regular;
-pub use store::{ActivePointer, Store};
+pub use store::Store;
 pub use thermometers::ThermometersEntry;
 
 use failure::{io_error, unsound};
+
+#[cfg(test)]
+mod disk_tests;
+#[cfg(test)]
+mod enumeration_tests;
 
 /// The version of every file this program writes.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -1,24 +1,17 @@
 //! Calibrations: immutable, addressed by their content, activated by a pointer.
 
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::content::{CalibrationRecord, Content, ContentKind, Glance};
-use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound, write_new_or_replace};
-
-/// Which calibration an axis uses, and which it used before (oldest first).
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ActivePointer {
-    /// Of this struct.
-    pub schema_version: u32,
-    /// The calibration in use.
-    pub current: Option<String>,
-    /// Those in use before.
-    pub history: Vec<String>,
-}
+use super::door::Door;
+use super::files::Files;
+use super::pointer::ActivePointer;
+use super::run_name::RunName;
+use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound};
 
 /// One machine's folder.
 ///
@@ -27,7 +20,7 @@ pub struct ActivePointer {
 /// ```
 /// use machine::records::sound::{Judged, counted};
 /// use machine::records::{CalibrationRecord, Content, ContentKind, RecordHead, Store};
-/// use serde::{Deserialize, Serialize};
+/// use serde::Deserialize;
 ///
 /// #[derive(Debug, PartialEq, Serialize, Deserialize)]
 /// struct Note {
@@ -58,8 +51,9 @@ pub struct ActivePointer {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Store {
-    root: PathBuf,
+    pub(super) root: PathBuf,
     kinds: &'static [ContentKind],
+    pub(super) door: Door,
 }
 
 impl Store {
@@ -68,6 +62,20 @@ impl Store {
         Self {
             root: data_dir.join(machine),
             kinds,
+            door: Door::of_system(),
+        }
+    }
+
+    /// The same store in these `files`.
+    #[must_use]
+    pub fn in_files(self, files: Arc<dyn Files>) -> Self {
+        self.through(Door::Direct(files))
+    }
+
+    pub(super) fn through(&self, door: Door) -> Self {
+        Self {
+            door,
+            ..self.clone()
         }
     }
 
@@ -81,20 +89,23 @@ impl Store {
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn journals(&self) -> Result<Vec<String>, StoreError> {
-        let mut names = list_folder(&self.runs())?;
+        let mut names = self.list_folder(&self.runs())?;
         names.retain(|name| name.ends_with(".jsonl"));
         Ok(names)
     }
 
-    /// The newest journal of `verb` on `axis`; their names begin with the time.
+    /// The newest journal of `verb` on `axis`. Their names are in the order in which they were begun, also where the
+    /// clock was set back meanwhile.
     ///
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn newest_run(&self, verb: &str, axis: &str) -> Result<Option<PathBuf>, StoreError> {
-        let part = format!("-{verb}-{axis}-");
-        let mut names = self.journals()?;
-        names.retain(|name| name.contains(&part));
-        Ok(names.into_iter().max().map(|name| self.runs().join(name)))
+        let names = self.journals()?;
+        let newest = names
+            .into_iter()
+            .filter_map(|name| Some((RunName::parse(&name, verb, axis)?, name)))
+            .max();
+        Ok(newest.map(|(_, name)| self.runs().join(name)))
     }
 
     /// The folder of the run journals.
@@ -123,7 +134,7 @@ impl Store {
     pub fn save<C: Content>(&self, record: &CalibrationRecord<C>) -> Result<String, StoreError> {
         let bytes = record.bytes();
         let id = blake3::hash(&bytes).to_hex().to_string();
-        write_new_or_replace(&self.calibration_path(&id), &bytes)?;
+        self.door.replace(&self.calibration_path(&id), bytes)?;
         Ok(id)
     }
 
@@ -171,7 +182,7 @@ impl Store {
     /// Where calibration `id` is, and its bytes, if they are those that were stored.
     fn bytes(&self, id: &str) -> Result<(PathBuf, Vec<u8>), StoreError> {
         let path = self.calibration_path(id);
-        let bytes = fs::read(&path).map_err(io_error("read", &path))?;
+        let bytes = self.door.read(&path).map_err(io_error("read", &path))?;
         let seen = blake3::hash(&bytes).to_hex().to_string();
         if seen != id {
             return Err(StoreError::Damaged { path, seen });
@@ -203,7 +214,8 @@ impl Store {
     /// # Errors
     /// When the folder cannot be read; a missing one is an empty one.
     pub fn list(&self) -> Result<Vec<String>, StoreError> {
-        let mut names: Vec<_> = list_folder(&self.root.join("calibrations"))?
+        let mut names: Vec<_> = self
+            .list_folder(&self.root.join("calibrations"))?
             .into_iter()
             .filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()))
             .collect();
@@ -216,7 +228,8 @@ impl Store {
         let runs = path.parent()?;
         let is_store = runs.file_name()? == "runs";
         let root = runs.parent()?.to_owned();
-        is_store.then_some(Self { root, kinds })
+        let door = Door::of_system();
+        is_store.then_some(Self { root, kinds, door })
     }
 
     /// The calibrations of a kind that were made from the journal called `source`, with their names;
@@ -253,7 +266,7 @@ impl Store {
     /// When the pointer is there but cannot be read.
     pub fn active(&self, axis: &str) -> Result<ActivePointer, StoreError> {
         let path = self.pointer_path(axis);
-        match fs::read(&path) {
+        match self.door.read(&path) {
             Ok(bytes) => parse_versioned(&path, &bytes),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(ActivePointer {
                 schema_version: SCHEMA_VERSION,
@@ -347,28 +360,24 @@ impl Store {
     /// # Errors
     /// When it cannot be written.
     pub fn write_report(&self, path: &Path, html: &str) -> Result<(), StoreError> {
-        write_new_or_replace(path, html.as_bytes())
+        self.door.replace(path, html.as_bytes().to_vec())
     }
 
     fn write_pointer(&self, axis: &str, pointer: &ActivePointer) -> Result<(), StoreError> {
         let bytes = serde_json::to_vec_pretty(pointer).expect("plain data always serialises");
-        write_new_or_replace(&self.pointer_path(axis), &bytes)
+        self.door.replace_pointer(&self.pointer_path(axis), bytes)
     }
-}
 
-/// The names in a folder; a missing folder is an empty one.
-fn list_folder(folder: &Path) -> Result<Vec<String>, StoreError> {
-    let entries = match fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(io_error("list", folder)(error)),
-    };
-    let mut names = Vec::new();
-    for entry in entries {
-        let entry = entry.map_err(io_error("list", folder))?;
-        names.push(entry.file_name().to_string_lossy().into_owned());
+    /// The names in a folder; a missing folder is an empty one.
+    fn list_folder(&self, folder: &Path) -> Result<Vec<String>, StoreError> {
+        let names = match self.door.list(folder) {
+            Ok(names) => names,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) => return Err(io_error("list", folder)(error)),
+        };
+        let names = names.iter().map(|name| name.to_string_lossy().into_owned());
+        Ok(names.collect())
     }
-    Ok(names)
 }
 
 /// Of which kind a calibration is, and of which axis.

@@ -23,7 +23,7 @@ pub(crate) fn job_judge(config: MachineConfig, hash: ConfigHash) -> JobJudge {
         let plan = JobPlan::on(&job, (&config, &hash), store)?;
         plan.require(&job.axis, asked.beyond)?;
         if let Some(journal) = asked.resume {
-            goes_on_at(journal, &job, &plan.calibration)?;
+            goes_on_at(store, journal, &job, &plan.calibration)?;
         }
         let speed = config.axis[&job.axis].motion.speed_mm_per_s;
         let planned = planned(&job, &plan, MetresPerSecond(speed * 1e-3));

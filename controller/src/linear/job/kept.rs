@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use machine::records::{first_difference, not_resumable, read_journal};
+use machine::records::{Store, first_difference, not_resumable};
 use units::{Metres, Short};
 
 use crate::failure::Failure;
@@ -48,8 +48,13 @@ impl GoOn {
 ///
 /// # Errors
 /// When the journal cannot be read, is complete, or is that of another job or calibration: what differs is named.
-pub(crate) fn goes_on_at(path: &Path, job: &Job, calibration: &str) -> Result<Stop, Failure> {
-    let read = read_journal::<LinearLog>(path)?;
+pub(crate) fn goes_on_at(
+    store: &Store,
+    path: &Path,
+    job: &Job,
+    calibration: &str,
+) -> Result<Stop, Failure> {
+    let read = store.read_journal::<LinearLog>(path)?;
     if read.complete {
         let path = path.to_owned();
         return Err(StoreError::AlreadyComplete { path }.into());

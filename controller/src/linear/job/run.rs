@@ -12,9 +12,9 @@ use crate::linear::job::{GoOn, Job, JobInput, JobOperator, JobPoint, Reached};
 use crate::linear::stage::LinearStage;
 use crate::linear::{LinearEntry, LinearLog, ReachedEntry, WentOnEntry};
 use crate::made_by::made_by;
-use crate::run::{note_failure, utc_now};
+use crate::run::{note_failure, settle, utc_now};
 use crate::store::{InstrumentRecord, Journal, JournalHeader, SCHEMA_VERSION, Store};
-use machine::Stage;
+use machine::{Stage, read_ahead};
 
 /// How long the machine lives between two looks at the operator or at an input.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -54,9 +54,12 @@ impl LinearStage<'_> {
     ) -> Result<JobDone, Failure> {
         let calibration = self.calibration_of_jobs(store)?;
         let header = self.job_header(job, &calibration);
-        let mut journal = Journal::create(&store.runs(), &header)?;
+        let mut journal = store.create_journal(&header)?;
         journal.write(&LinearEntry::Job(entry_of(job)))?;
-        self.do_job((job, (1, 1)), calibration, operator, journal)
+        settle(&mut self.core, store)?;
+        let done = self.do_job((job, (1, 1)), calibration, operator, journal)?;
+        settle(&mut self.core, store)?;
+        Ok(done)
     }
 
     /// Goes on with a job whose journal ends before it: at the point after the last one that it went on from.
@@ -74,10 +77,14 @@ impl LinearStage<'_> {
         operator: &mut dyn JobOperator,
     ) -> Result<JobDone, Failure> {
         let calibration = self.calibration_of_jobs(store)?;
-        let stop = goes_on_at(journal, job, &calibration)?;
+        read_ahead(&mut self.core, store, journal.to_owned())?;
+        let stop = goes_on_at(store, journal, job, &calibration)?;
         let header = self.job_header(job, &calibration);
-        let (journal, _) = Journal::resume(journal, &header, self.core.config_hash)?;
-        self.do_job((job, stop), calibration, operator, journal)
+        let (journal, _) = store.resume_journal(journal, &header, self.core.config_hash)?;
+        settle(&mut self.core, store)?;
+        let done = self.do_job((job, stop), calibration, operator, journal)?;
+        settle(&mut self.core, store)?;
+        Ok(done)
     }
 
     fn calibration_of_jobs(&mut self, store: &Store) -> Result<String, Failure> {

@@ -54,7 +54,7 @@ impl GoesOn {
         let Some(journal) = journal_to_resume(resume, store, VERB, &job.axis)? else {
             return Ok(None);
         };
-        let at = goes_on_at(&journal, job, &plan.calibration)?;
+        let at = goes_on_at(store, &journal, job, &plan.calibration)?;
         Ok(Some(Self { journal, at }))
     }
 

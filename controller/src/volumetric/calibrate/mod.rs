@@ -48,7 +48,7 @@ pub(crate) use scatter::Scatter;
 use crate::config::MachineConfig;
 use crate::failure::Failure;
 use crate::made_by::made_by;
-use crate::run::{CalibrateOptions, note_failure, require_certified, utc_now};
+use crate::run::{CalibrateOptions, note_failure, require_certified, settle, utc_now};
 use crate::store::budget::PlacesBudgetRecord;
 use crate::store::{
     CalibrationRecord, InstrumentRecord, Journal, JournalHeader, RecordHead, SCHEMA_VERSION, Store,
@@ -67,6 +67,7 @@ use crate::volumetric::{GEOMETRY, REFERENCES, VolumetricFailure};
 use crate::volumetric::{LineVoidEntry, VolumeEntry};
 use crate::volumetric::{VolumetricCalibrateConfig, VolumetricConfig};
 use machine::Stage;
+use machine::{ask_disk, read_ahead};
 
 use crate::volumetric::reference::mean::Noise;
 use known::Known;
@@ -199,7 +200,7 @@ impl WorkVolume<'_> {
     ) -> Result<VolumetricCalibrated, Failure> {
         let resume = options.resume.as_deref();
         let warm_up = match (warm_up, resume) {
-            (WarmUp::None, Some(journal)) => warm_up_of(journal),
+            (WarmUp::None, Some(journal)) => warm_up_of(&mut self.core, store, journal)?,
             (given, _) => given,
         };
         let config = self.config.clone();
@@ -210,8 +211,12 @@ impl WorkVolume<'_> {
             ..plan
         };
         let header = self.header("calibrate", None)?;
+        if let Some(journal) = resume {
+            read_ahead(&mut self.core, store, journal.to_owned())?;
+        }
         let (mut journal, read) =
             resume::open(store, &header, plan, resume, self.core.config_hash)?;
+        settle(&mut self.core, store)?;
         let made = self
             .calibration_session(config, lines, read, &mut journal, operator)
             .and_then(|mut session| {
@@ -220,6 +225,7 @@ impl WorkVolume<'_> {
             });
         let made = made.inspect_err(|it| note_failure(&mut journal, it))?;
         journal.complete()?;
+        settle(&mut self.core, store)?;
         Ok(made)
     }
 
@@ -410,11 +416,17 @@ impl WorkVolume<'_> {
         };
         let content = evaluated.content(&session.config);
         let (unknown, budget) = (content.unknown.clone(), content.budget.clone());
+        settle(&mut self.core, store)?;
         let id = store.save(&CalibrationRecord { head, content })?;
         let references = self.keep_references(store, &id, session.references, &source)?;
         if is_used {
             // With its references, and without memories that count from others.
-            use_geometry(store, &id)?;
+            let own = id.clone();
+            ask_disk(&mut self.core, store, move |store| {
+                use_geometry(store, &own)
+            })??;
+        } else {
+            settle(&mut self.core, store)?;
         }
         Ok(VolumetricCalibrated {
             id,

@@ -33,11 +33,11 @@ pub(super) fn open(
     hash: &ConfigHash,
 ) -> Result<(Journal<VolumeLog>, VolumeLog), Failure> {
     let Some(path) = resume else {
-        let mut journal = Journal::create(&store.runs(), header)?;
+        let mut journal = store.create_journal(header)?;
         let read = begin(&mut journal, plan)?;
         return Ok((journal, read));
     };
-    let (mut journal, read) = Journal::<VolumeLog>::resume(path, header, hash)?;
+    let (mut journal, read) = store.resume_journal::<VolumeLog>(path, header, hash)?;
     let read = match read.log.plan {
         // Killed before its second line: nothing was read yet.
         None => begin(&mut journal, plan)?,

@@ -9,10 +9,13 @@
 
 use std::path::Path;
 
-use machine::records::read_journal;
+use machine::ask_disk;
+use machine::records::{Store, read_journal};
 use units::{Celsius, Short};
 
 use super::WarmUp;
+use crate::failure::Failure;
+use crate::handle::Core;
 use crate::volumetric::VolumeLog;
 
 /// How much of the rise must be left.
@@ -29,9 +32,17 @@ pub(crate) fn minutes_of(journal: &Path) -> Option<f64> {
 }
 
 /// The same as it is done. What is wrong with the journal is said when it is continued.
-pub(super) fn warm_up_of(journal: &Path) -> WarmUp {
-    let warm_up = minutes_of(journal).and_then(WarmUp::of_minutes);
-    warm_up.unwrap_or(WarmUp::None)
+///
+/// # Errors
+/// Whatever stops the machine meanwhile.
+pub(super) fn warm_up_of(
+    core: &mut Core<'_>,
+    store: &Store,
+    journal: &Path,
+) -> Result<WarmUp, Failure> {
+    let journal = journal.to_owned();
+    let minutes = ask_disk(core, store, move |_| minutes_of(&journal))?;
+    Ok(minutes.and_then(WarmUp::of_minutes).unwrap_or(WarmUp::None))
 }
 
 /// What is left of what the machine had warmed up by where it was interrupted.

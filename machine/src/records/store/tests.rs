@@ -1,6 +1,9 @@
 use super::super::head::RecordHead;
 use super::super::sound::{self, Judged};
 use super::*;
+use crate::records::write_new_or_replace;
+use serde::Serialize;
+use std::fs;
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,4 +1,9 @@
+use serde::{Deserialize, Serialize};
+
 use super::*;
+use crate::records::sound::Judged;
+use crate::records::{AnyLog, SCHEMA_VERSION, read_journal};
+use std::fs;
 
 /// Readings, of which a continued run keeps those that are even.
 #[derive(Clone, Debug, Default, PartialEq)]
