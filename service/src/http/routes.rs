@@ -284,6 +284,18 @@ mod tests {
 
     use super::*;
 
+    struct Endless;
+
+    impl Ending for Endless {
+        fn has_ended(&self) -> bool {
+            false
+        }
+
+        fn waits_for_disk(&self) -> bool {
+            false
+        }
+    }
+
     #[test]
     fn a_wait_keeps_the_lease_at_once_and_each_five_seconds() {
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -292,7 +304,7 @@ mod tests {
             .build();
         let kept = Cell::new(0);
         let wait = Wait { wait_s: Some(12.0) };
-        let waiting = wait.until(|| kept.set(kept.get() + 1), || Ok(()), |()| false);
+        let waiting = wait.until(|| kept.set(kept.get() + 1), || Ok(Endless));
         runtime.unwrap().block_on(waiting).unwrap();
         assert_eq!(kept.get(), 3, "at 0, 5 and 10 s");
     }
