@@ -380,13 +380,12 @@ fn journal_of<L: Log>(
     path: &Path,
     mut whole: impl FnMut(&str),
 ) -> Result<ReadJournal<L>, StoreError> {
-    let file = open_regular(path, JOURNAL_MAX).map_err(io_error("read", path))?;
-    let mut file = BufReader::new(file);
+    let file = open_regular(path, JOURNAL_MAX);
+    let mut file = BufReader::new(file.map_err(io_error("read", path))?);
     let mut read: Option<ReadJournal<L>> = None;
     let mut hash = blake3::Hasher::new();
     let mut valid_bytes = 0;
-    let mut torn = false;
-    let mut line = Vec::new();
+    let (mut torn, mut line) = (false, Vec::new());
     for number in 1.. {
         let is_last = next_line(&mut file, &mut line).map_err(io_error("read", path))?;
         if line.is_empty() {
@@ -408,8 +407,7 @@ fn journal_of<L: Log>(
     }
     let missing = "the header line is missing or incomplete";
     let mut read = read.ok_or_else(|| damaged(path, 1, missing))?;
-    read.valid_bytes = valid_bytes;
-    read.torn = torn;
+    (read.valid_bytes, read.torn) = (valid_bytes, torn);
     read.blake3 = hash.finalize().to_hex().to_string();
     Ok(read)
 }
@@ -438,7 +436,7 @@ fn take<L: Log>(
         return Ok(());
     };
     match parsed {
-        Line::Mark(Mark::Header(_)) => return Err(no_header(path, line)),
+        Line::Mark(Mark::Header(_)) => return Err(damaged(path, line, NO_HEADER)),
         Line::Mark(Mark::Resumed { .. }) => {
             read.complete = false;
             read.failure = None;
@@ -465,7 +463,7 @@ fn begin<L: Log>(
     parsed: Line<L::Entry>,
 ) -> Result<ReadJournal<L>, StoreError> {
     let Line::Mark(Mark::Header(header)) = parsed else {
-        return Err(no_header(path, line));
+        return Err(damaged(path, line, NO_HEADER));
     };
     if header.schema_version > SCHEMA_VERSION {
         return Err(StoreError::Newer {
@@ -485,13 +483,8 @@ fn begin<L: Log>(
     })
 }
 
-fn no_header(path: &Path, line: usize) -> StoreError {
-    damaged(
-        path,
-        line,
-        "the header must be the first line and the only one",
-    )
-}
+/// Of a journal that begins otherwise.
+const NO_HEADER: &str = "the header must be the first line and the only one";
 
 fn damaged(path: &Path, line: usize, cause: &str) -> StoreError {
     StoreError::Format {
