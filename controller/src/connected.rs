@@ -6,7 +6,7 @@ use drivers::transport::Transport;
 use machine::kept_zero;
 
 use crate::assemble;
-use crate::config::{ConfigFile, ConfigHash, Diagnostic, Loaded, MachineConfig, filled_in};
+use crate::config::{ConfigHash, Diagnostic, Loaded, MachineConfig, filled_in};
 use crate::failure::Failure;
 use crate::memories::Memories;
 use crate::run;
@@ -20,8 +20,6 @@ pub struct Machine {
     pub(crate) config: MachineConfig,
     pub(crate) config_hash: ConfigHash,
     pub(crate) memories: Memories,
-    /// The file that the configuration was read from.
-    config_file: Option<ConfigFile>,
     /// What the configuration has of an example.
     unfilled: Vec<Diagnostic>,
 }
@@ -52,7 +50,6 @@ impl Machine {
             config: loaded.config.clone(),
             config_hash: loaded.hash.clone(),
             memories: Memories::default(),
-            config_file: loaded.file.clone(),
             unfilled: loaded.unfilled.clone(),
         }
     }
@@ -105,11 +102,6 @@ impl Machine {
     /// The configuration.
     pub const fn config(&self) -> &MachineConfig {
         &self.config
-    }
-
-    /// The file that it was made of, where it was one.
-    pub const fn config_file(&self) -> Option<&ConfigFile> {
-        self.config_file.as_ref()
     }
 
     /// Of what a calibration depends on.

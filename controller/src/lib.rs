@@ -73,6 +73,7 @@ mod run;
 pub mod runs;
 mod store;
 mod stores;
+mod time_of_day;
 pub mod volumetric;
 mod worse;
 
@@ -81,7 +82,7 @@ pub use agreed::Agreed;
 pub use connected::Machine;
 pub use failure::Failure;
 pub use groups::groups;
-pub use run::{CalibrateOptions, time_of_day};
+pub use run::CalibrateOptions;
 
 // The command, whose `main` is this alone; who keeps a machine for others is given to it.
 #[cfg(feature = "program")]

@@ -3,9 +3,6 @@
 
 use core::f64::consts::TAU;
 use std::path::PathBuf;
-use std::time::SystemTime;
-
-use jiff::Timestamp;
 
 use crate::certificate;
 use crate::config::{ConfigHash, MachineConfig};
@@ -15,6 +12,7 @@ use crate::store::{
     EnvironmentRecord, IdentityRecord, InstrumentRecord, Journal, Log, RecordHead, SCHEMA_VERSION,
     Store, StoreError,
 };
+use crate::time_of_day::time_of_day;
 
 /// How a calibration is made.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -30,16 +28,6 @@ pub struct CalibrateOptions {
 /// The time of day for records, UTC, RFC 3339, to the second. Control never reads it.
 pub(crate) fn utc_now() -> String {
     time_of_day().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
-}
-
-/// The time of day by the clock of this computer. A clock that is set beyond all calendars is at their end: it is no
-/// reason to leave axes alone.
-pub fn time_of_day() -> Timestamp {
-    of_clock(SystemTime::now())
-}
-
-fn of_clock(time: SystemTime) -> Timestamp {
-    Timestamp::try_from(time).unwrap_or(Timestamp::MAX)
 }
 
 /// Whether the certificates of `config` whose keys begin with `of` hold today.
@@ -135,20 +123,4 @@ pub(crate) fn drive_record(machine: &machine::Machine, axis: &str) -> IdentityRe
         .as_ref()
         .map(IdentityRecord::from)
         .unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use core::time::Duration;
-
-    use super::*;
-
-    #[test]
-    fn a_clock_beyond_all_calendars_is_at_their_end() {
-        let year_12000 = SystemTime::UNIX_EPOCH + Duration::from_secs(316_516_464_000);
-        let end = of_clock(year_12000);
-        assert_eq!(end.strftime("%Y").to_string(), "9999");
-        let epoch = of_clock(SystemTime::UNIX_EPOCH);
-        assert_eq!(epoch, Timestamp::UNIX_EPOCH);
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use truestage::config::ConfigFile;
+use truestage::config::MachineConfig;
 use units::{Metres, Time};
 
 use crate::coordinate::Coordinate;
@@ -24,8 +24,8 @@ pub(crate) struct Fixed {
     pub(crate) axes: Vec<FixedAxis>,
     /// Axes that can move as one.
     pub(crate) groups: Vec<GroupView>,
-    /// The file of its configuration.
-    pub(crate) config_file: Option<ConfigFile>,
+    /// What its file said.
+    pub(crate) config: MachineConfig,
 }
 
 /// What never changes of an axis.

@@ -14,7 +14,7 @@ use super::table::Certified;
 use super::xml::{BYTES_MAX, parsed};
 use super::{Unfit, result, unfit};
 use crate::config::judge::{Finding, Judge};
-use crate::run::time_of_day;
+use crate::time_of_day::time_of_day;
 
 /// A certificate that a configuration names, where it stands there.
 pub(crate) struct Named<'a> {

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use machine::records::ConfigHash;
 
 use super::whole;
-use crate::run::time_of_day;
+use crate::time_of_day::time_of_day;
 
 /// A configuration's file as it was read, to be compared with what it says later.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ConfigFile {
+pub(crate) struct ConfigFile {
     path: PathBuf,
     text: ConfigHash,
     /// When it was read, UTC, to the minute.
@@ -27,7 +27,7 @@ impl ConfigFile {
     }
 
     /// That the file says something else by now, for whoever goes on with what it said. Reads the disk.
-    pub fn change(&self) -> Option<String> {
+    pub(super) fn change(&self) -> Option<String> {
         let (path, read_at) = (self.path.display(), &self.read_at);
         let what = match whole::text_of(&self.path) {
             Ok(text) if ConfigHash::of_texts(&text, &[]) == self.text => return None,
@@ -50,7 +50,7 @@ mod tests {
         let path = file.path();
         let text = include_str!("../../../configs/machines/linear.toml");
         std::fs::write(path, text).unwrap();
-        let read = load(path).unwrap().file.unwrap();
+        let read = load(path).unwrap().config.file.unwrap();
         assert_eq!(read.change(), None);
         // Written anew with the same text, it says the same.
         std::fs::write(path, text).unwrap();

@@ -38,8 +38,6 @@ pub struct Loaded {
     pub hash: ConfigHash,
     /// Of the whole text: what a kept zero depends on.
     pub(crate) text: ConfigHash,
-    /// The file that it was read from, where it was.
-    pub(crate) file: Option<ConfigFile>,
     /// What is doubtful of it, in the order of the file.
     pub warnings: Vec<Diagnostic>,
     /// What is still an example's value, marked as such by `truestage new`: a machine of it does not start.
@@ -63,7 +61,7 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
     // same calibrations and take the same lease.
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut loaded = parse_at(&text, &path.display().to_string(), Some(folder))?;
-    loaded.file = Some(ConfigFile::of(path, loaded.text.clone()));
+    loaded.config.file = Some(ConfigFile::of(path, loaded.text.clone()));
     let section = &mut loaded.config.machine;
     section.data_dir = folder.join(&section.data_dir);
     Ok(loaded)
@@ -112,7 +110,6 @@ fn parse_at(text: &str, file: &str, folder: Option<&Path>) -> Result<Loaded, Con
     Ok(Loaded {
         hash: hash_of(&config),
         text: ConfigHash::of_texts(text, &[]),
-        file: None,
         warnings: merged(placed(text, file, at_values(warnings)), glued),
         ended: placed(text, file, at_values(ended)),
         unfilled: lines::unfilled(text, file),

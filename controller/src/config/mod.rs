@@ -48,7 +48,6 @@ mod whole;
 // What users write; `tests/tidy/public_names.txt` lists it.
 pub use diagnostic::ConfigError;
 pub(crate) use diagnostic::Diagnostic;
-pub use file::ConfigFile;
 pub(crate) use load::filled_in;
 pub use load::{Loaded, load, parse};
 pub use model::MachineConfig;

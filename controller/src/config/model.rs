@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::axis::AxisConfig;
+use super::file::ConfigFile;
 use crate::certificate::{CertificateConfig, Measurand, Named};
 use crate::hardware::analog::AnalogConfig;
 use crate::hardware::bus::{CanBus, SerialLine, Wiring};
@@ -54,6 +55,9 @@ pub struct MachineConfig {
     pub platform: Option<PlatformConfig>,
     /// The three axes that are corrected throughout their volume.
     pub volumetric: Option<VolumetricConfig>,
+    /// The file that it was read from, where it was one.
+    #[serde(skip)]
+    pub(crate) file: Option<ConfigFile>,
 }
 
 /// Who the machine is, and where its records lie.
@@ -72,6 +76,11 @@ pub struct MachineSection {
 }
 
 impl MachineConfig {
+    /// That its file says something else by now, for whoever goes on with what it said. Reads the disk.
+    pub fn change_of_file(&self) -> Option<String> {
+        self.file.as_ref().and_then(ConfigFile::change)
+    }
+
     /// Its buses and lines.
     pub const fn wiring(&self) -> Wiring<'_> {
         Wiring {

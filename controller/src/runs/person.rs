@@ -7,7 +7,7 @@ use crate::failure::Failure;
 
 /// What the drives do while a person is asked, and as soon as the question is answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriveState {
+pub(crate) enum DriveState {
     /// The run has switched its drives off.
     Off,
     /// The axis holds its place under power.
@@ -16,7 +16,7 @@ pub enum DriveState {
 
 impl DriveState {
     /// What a person must know before he goes near; `answering` is how he answers, as in `you press Enter`.
-    pub fn warning(self, answering: &str) -> String {
+    pub(crate) fn warning(self, answering: &str) -> String {
         match self {
             Self::Off => format!(
                 "the drives of this run are switched off, which is not a safe stop: make the machine safe first; as \
@@ -43,12 +43,17 @@ pub struct Question {
     /// Whether hands are in the machine until it is answered: nothing else moves then.
     pub by_hand: bool,
     /// What the drives do meanwhile, where a person must know it.
-    pub drives: Option<DriveState>,
+    pub(crate) drives: Option<DriveState>,
     /// What is to be done, for programs.
     pub task: Value,
 }
 
 impl Question {
+    /// What the person must know of the drives first, where any are driven; `answering` is how he answers.
+    pub fn warning(&self, answering: &str) -> Option<String> {
+        self.drives.map(|drives| drives.warning(answering))
+    }
+
     /// What is done by hand while the drives are as said: `done` when it is.
     pub(crate) fn of_work(
         what: &'static str,

@@ -228,8 +228,7 @@ pub(super) fn journal_of<L: Log>(
     let mut read: Option<ReadJournal<L>> = None;
     let mut hash = blake3::Hasher::new();
     let mut valid_bytes = 0;
-    let mut torn = false;
-    let mut line = Vec::new();
+    let (mut torn, mut line) = (false, Vec::new());
     for number in 1.. {
         let is_last = next_line(&mut file, &mut line).map_err(io_error("read", path))?;
         if line.is_empty() {
@@ -256,8 +255,7 @@ pub(super) fn journal_of<L: Log>(
     }
     let missing = "the header line is missing or incomplete";
     let mut read = read.ok_or_else(|| damaged(path, 1, missing))?;
-    read.valid_bytes = valid_bytes;
-    read.torn = torn;
+    (read.valid_bytes, read.torn) = (valid_bytes, torn);
     read.blake3 = hash.finalize().to_hex().to_string();
     Ok(read)
 }
@@ -286,7 +284,7 @@ fn take<L: Log>(
         return Ok(());
     };
     match parsed {
-        Line::Mark(Mark::Header(_)) => return Err(no_header(path, line)),
+        Line::Mark(Mark::Header(_)) => return Err(damaged(path, line, NO_HEADER)),
         Line::Mark(Mark::Resumed { .. }) => {
             read.complete = false;
             read.failure = None;
@@ -313,7 +311,7 @@ fn begin<L: Log>(
     parsed: Line<L::Entry>,
 ) -> Result<ReadJournal<L>, StoreError> {
     let Line::Mark(Mark::Header(header)) = parsed else {
-        return Err(no_header(path, line));
+        return Err(damaged(path, line, NO_HEADER));
     };
     if header.schema_version > SCHEMA_VERSION {
         return Err(StoreError::Newer {
@@ -333,13 +331,8 @@ fn begin<L: Log>(
     })
 }
 
-fn no_header(path: &Path, line: usize) -> StoreError {
-    damaged(
-        path,
-        line,
-        "the header must be the first line and the only one",
-    )
-}
+/// Of a journal that begins otherwise.
+const NO_HEADER: &str = "the header must be the first line and the only one";
 
 fn damaged(path: &Path, line: usize, cause: &str) -> StoreError {
     StoreError::Format {

@@ -37,13 +37,16 @@ pub(super) struct Talk {
 pub(crate) struct Asker(Rc<RefCell<Talk>>);
 
 impl Person for Asker {
-    fn ask(&mut self, question: Question) -> Result<(), Failure> {
+    fn ask(&mut self, mut question: Question) -> Result<(), Failure> {
         let mut talk = self.0.borrow_mut();
         let said = core::mem::take(&mut talk.said);
-        let text = said.into_iter().chain([question.text]);
+        let text = said
+            .into_iter()
+            .chain([core::mem::take(&mut question.text)]);
         let text = text.collect::<Vec<_>>().join("\n");
         talk.answer = None;
-        talk.asked = Some(Question { text, ..question });
+        question.text = text;
+        talk.asked = Some(question);
         Ok(())
     }
 
@@ -115,17 +118,15 @@ impl Keeper {
         run.asked += 1;
         // What is read by hand is asked line by line: hands are there in between, too.
         run.has_hands = question.by_hand && question.takes_text;
+        let safety = question.warning(ANSWERED).unwrap_or_default();
         let question = QuestionView {
+            safety,
             number: run.asked,
             what: question.what.to_owned(),
             text: question.text,
             answers: question.answers.iter().map(|it| (*it).to_owned()).collect(),
             takes_text: question.takes_text,
             by_hand: question.by_hand,
-            safety: question
-                .drives
-                .map(|drives| drives.warning(ANSWERED))
-                .unwrap_or_default(),
             task: question.task,
         };
         let (id, data) = (run.view.id.clone(), json!(question));

@@ -37,7 +37,7 @@ pub(crate) fn fixed(machine: &mut Machine, groups: &[Group]) -> Result<Fixed, Fa
         started: utc_now(),
         axes,
         groups: groups.iter().filter_map(moved_as_one).collect(),
-        config_file: machine.config_file().cloned(),
+        config: machine.config().clone(),
     })
 }
 

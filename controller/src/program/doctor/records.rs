@@ -12,7 +12,7 @@ use super::checked::Checked;
 use crate::config::MachineConfig;
 use crate::groups;
 use crate::program::intended::ago;
-use crate::time_of_day;
+use crate::time_of_day::time_of_day;
 
 /// Less than this is left: a run may not find room for its journal.
 const ROOM_LEAST: u64 = 1 << 30;

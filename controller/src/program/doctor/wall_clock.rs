@@ -9,7 +9,7 @@ use super::checked::Checked;
 use super::host::Host;
 use super::records::pointers;
 use crate::config::MachineConfig;
-use crate::time_of_day;
+use crate::time_of_day::time_of_day;
 
 const SUBJECT: &str = "time of day";
 /// No computer with this program has an earlier one (2026-01-01); one without a battery begins in 1970 or 2000.

@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use units::Several;
 
-use crate::time_of_day;
+use crate::time_of_day::time_of_day;
 
 const MINUTE_S: i64 = 60;
 const HOUR_S: i64 = 60 * MINUTE_S;
