@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use machine::records::files::{Files, OpenFile, OsFiles};
-use machine::records::{DiskPace, Store, StoreError, read_journal};
+use machine::records::{DiskPace, Store, read_journal};
 use tests::Bench;
 use truestage::linear::LinearLog;
 use truestage::{CalibrateOptions, Failure, Machine};
