@@ -19,6 +19,7 @@ mod failure;
 mod golden;
 mod handle;
 mod header;
+mod in_use;
 mod jog;
 mod kind;
 mod log;
