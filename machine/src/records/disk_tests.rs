@@ -65,6 +65,10 @@ impl Files for Hanging {
     fn mode(&self, path: &Path) -> io::Result<u32> {
         self.files.mode(path)
     }
+
+    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
+        self.files.identity(path)
+    }
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.pass();
         self.files.rename(from, to)

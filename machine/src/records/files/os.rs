@@ -6,6 +6,8 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+use super::super::journal::JOURNAL_MAX;
+use super::super::regular::open_regular;
 use super::{Files, OpenFile};
 
 /// The permissions of a file that everybody may use; the umask takes its share off.
@@ -18,7 +20,7 @@ pub struct OsFiles;
 impl Files for OsFiles {
     fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        File::open(path)?.read_to_end(&mut bytes)?;
+        open_regular(path, JOURNAL_MAX)?.read_to_end(&mut bytes)?;
         Ok(bytes)
     }
 
