@@ -9,12 +9,14 @@ use utoipa::ToSchema;
 mod chosen;
 mod ending;
 mod event;
+mod journal;
 mod storage;
 mod told;
 
 pub use chosen::{CalibrationView, ChangeView, ChosenView};
 pub(crate) use ending::Ending;
 pub use event::Event;
+pub use journal::JournalView;
 pub use storage::StorageView;
 pub use told::{StoredView, ToldView};
 
@@ -485,19 +487,4 @@ impl RunView {
         }
         data
     }
-}
-
-/// A journal of a run.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct JournalView {
-    /// Its name.
-    pub name: String,
-    /// `zero`, `calibrate`, `verify`, …; null when it cannot be read.
-    pub verb: Option<String>,
-    /// Of which axis.
-    pub axis: Option<String>,
-    /// When it was begun, UTC, RFC 3339.
-    pub started: Option<String>,
-    /// Whether its run came to its end.
-    pub complete: bool,
 }

@@ -1,5 +1,6 @@
 //! `truestage serve` as a user runs it: one process keeps the machine, any client asks it.
 
+use std::fs;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -274,6 +275,17 @@ fn a_service_shows_the_journals_of_runs_and_their_pages() {
     }
 }
 
+/// Whether a calibration has written down a point.
+fn has_measured(bench: &Bench) -> bool {
+    let Ok(runs) = fs::read_dir(bench.records().join("runs")) else {
+        return false;
+    };
+    let paths = runs.map(|entry| entry.expect("a folder can be read").path());
+    paths
+        .filter(|path| path.to_string_lossy().contains("-calibrate-"))
+        .any(|path| fs::read_to_string(path).is_ok_and(|text| text.contains("\"point\"")))
+}
+
 /// A client whose calibration goes on, slowly until the second is dropped.
 fn calibrating(bench: &Bench) -> (Process, Brake) {
     bench.run(&["zero", "machine.toml"]).with_code(0);
@@ -281,7 +293,7 @@ fn calibrating(bench: &Bench) -> (Process, Brake) {
     let mut time = Steps::of(bench);
     time.until(&mut client, || {
         let (_, axis) = ask(bench.folder(), "GET /v1/axes/x", &json!({}));
-        axis["used_by"].is_string()
+        axis["used_by"].is_string() && has_measured(bench)
     });
     (client, time.slowly())
 }

@@ -217,14 +217,43 @@ impl Stream {
         if self.state.is_blocked.load(Ordering::Relaxed) {
             return;
         }
-        let (reached, awaited) = channel();
-        self.give(Given::Awaited(reached));
-        let limit = match ARE_WAITS_LIMITED.load(Ordering::Relaxed) {
-            true => END_LIMIT,
-            false => Duration::MAX,
+        let limit = if ARE_WAITS_LIMITED.load(Ordering::Relaxed) {
+            END_LIMIT
+        } else {
+            Duration::MAX
         };
-        if awaited.recv_timeout(limit) == Err(RecvTimeoutError::Timeout) {
+        let begun = Instant::now();
+        let (reached, awaited) = channel();
+        if self.give_within(limit, Given::Awaited(reached)).is_err() {
             self.state.is_blocked.store(true, Ordering::Relaxed);
+            return;
+        }
+        let left = limit.saturating_sub(begun.elapsed());
+        if awaited.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
+            self.state.is_blocked.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Gives something to the writer, and waits until its queue has room. A writer that is gone takes nothing.
+    fn give_within(&self, limit: Duration, mut given: Given) -> Result<(), RecvTimeoutError> {
+        const LOOK_EVERY: Duration = Duration::from_millis(1);
+        let begun = Instant::now();
+        self.state.waiting.fetch_add(1, Ordering::Relaxed);
+        loop {
+            match self.given.try_send(given) {
+                Ok(()) => return Ok(()),
+                Err(TrySendError::Full(refused)) if begun.elapsed() < limit => given = refused,
+                Err(error) => {
+                    self.state.waiting.fetch_sub(1, Ordering::Relaxed);
+                    let is_full = matches!(error, TrySendError::Full(_));
+                    return if is_full {
+                        Err(RecvTimeoutError::Timeout)
+                    } else {
+                        Ok(())
+                    };
+                }
+            }
+            thread::sleep(LOOK_EVERY);
         }
     }
 

@@ -14,14 +14,11 @@ use serde::{Deserialize, Serialize};
 use super::door::Door;
 use super::head::{IdentityRecord, InstrumentRecord};
 use super::line::{json_of, next_line};
-use super::regular::open_regular;
+use super::regular::{JOURNAL_MAX, open_regular};
 use super::sound::{
     COUNT_MAX, ERROR_M, ERROR_U_M, Judged, PASSES_MAX, PLACE_M, counted, number, numbers, optional,
 };
 use super::{SCHEMA_VERSION, StoreError, io_error, unsound};
-
-/// So long a journal may be, in bytes: many times the longest that a run leaves.
-pub const JOURNAL_MAX: u64 = 256 << 20;
 
 /// What a run is: written first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -64,7 +64,7 @@ pub use head::{
 };
 pub use interrupted::InterruptedRun;
 pub use journal::{
-    AnyLog, ClosureEntry, JOURNAL_MAX, JournalHeader, Log, ReadJournal, read_entries, read_journal,
+    AnyLog, ClosureEntry, JournalHeader, Log, ReadJournal, read_entries, read_journal,
 };
 pub use journal_writer::{Journal, not_resumable};
 pub use lease::Lease;
@@ -72,7 +72,7 @@ pub use line::{opened, sealed};
 pub use name::short;
 pub(crate) use ordered::Asked;
 pub use pointer::ActivePointer;
-pub use regular::open_regular;
+pub use regular::{JOURNAL_MAX, open_regular};
 pub use store::Store;
 pub use thermometers::ThermometersEntry;
 

@@ -10,6 +10,9 @@ use std::path::Path;
 
 use nix::fcntl::OFlag;
 
+/// So long a journal may be, in bytes: many times the longest that a run leaves.
+pub const JOURNAL_MAX: u64 = 256 << 20;
+
 /// Opens the file at `path`, to be read as far as it goes now, `most` bytes at most.
 ///
 /// # Errors

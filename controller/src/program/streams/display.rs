@@ -88,7 +88,7 @@ mod tests {
         let shown = display.take(steps(1));
         assert_eq!(
             shown,
-            "\r\x1b[?7l  calibrate x    [========>                       ]    1/4       9s left\x1b[K\x1b[?7h"
+            "\r\x1b[?7l  calibrate x    [========>                       ]    1/4      9s left\x1b[K\x1b[?7h"
         );
         assert_eq!(display.take(steps(4)), "\r\x1b[?7l\x1b[K\x1b[?7h");
         assert_eq!(display.clear(), "", "nothing is drawn any more");

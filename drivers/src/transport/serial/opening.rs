@@ -82,7 +82,7 @@ fn require_alone(path: &str) -> Result<File, SerialError> {
             Some(Errno::EMFILE | Errno::ENFILE) => "allow more open files (`ulimit -n`)",
             _ => help_for(path),
         },
-        source,
+        source: plain(source),
     })?;
     let in_use = |errno: Errno| SerialError {
         source: errno.into(),
@@ -91,6 +91,14 @@ fn require_alone(path: &str) -> Result<File, SerialError> {
     let locked = Flock::lock(file, FlockArg::LockExclusiveNonblock);
     let locked = locked.map_err(|(_, errno)| in_use(errno))?;
     locked.unlock().map_err(|(_, errno)| in_use(errno))
+}
+
+/// The same error without its number, which says nothing to an operator.
+fn plain(error: std::io::Error) -> std::io::Error {
+    match error.raw_os_error().map(Errno::from_raw) {
+        Some(errno) => std::io::Error::new(error.kind(), errno.desc()),
+        None => error,
+    }
 }
 
 fn explain(path: &str, error: tokio_serial::Error) -> SerialError {

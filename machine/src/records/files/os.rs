@@ -6,8 +6,7 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use super::super::journal::JOURNAL_MAX;
-use super::super::regular::open_regular;
+use super::super::regular::{JOURNAL_MAX, open_regular};
 use super::{Files, OpenFile};
 
 /// The permissions of a file that everybody may use; the umask takes its share off.
