@@ -239,6 +239,7 @@ impl Desk {
     /// # Errors
     /// When there is none.
     pub fn motion(&self, id: &str) -> Result<MotionView, Problem> {
+        let id = &*self.ledger().whole_name(id);
         let snapshot = self.snapshot();
         let mut motions = snapshot.motions.iter();
         if let Some(view) = motions.find(|view| view.id == *id) {

@@ -126,6 +126,17 @@ impl Ledger {
         format!("{kind}{}{}-{number}", self.boot, self.life)
     }
 
+    /// The whole name where `id` is one of this start without its letters, as `m1-4` is of `m1kqhtz-4`. To look
+    /// something up, not to command: a person who reads a name aloud leaves the letters out.
+    pub(crate) fn whole_name(&self, id: &str) -> String {
+        let short = format!("{}-", self.boot);
+        let number = id.get(1..).and_then(|rest| rest.strip_prefix(&short));
+        number.map_or_else(
+            || id.to_owned(),
+            |number| format!("{}{}{}-{number}", &id[..1], self.boot, self.life),
+        )
+    }
+
     /// Whether this service gave the name `id`.
     fn is_own(&self, id: &str) -> bool {
         let own = format!("{}{}-", self.boot, self.life);

@@ -182,6 +182,7 @@ impl Desk {
     /// # Errors
     /// When there is none.
     pub fn run(&self, id: &str) -> Result<RunView, Problem> {
+        let id = &*self.ledger().whole_name(id);
         let snapshot = self.snapshot();
         let found = snapshot.runs.iter().find(|view| view.id == *id);
         let found = found.map(|view| self.run_with_kept(view));

@@ -94,6 +94,18 @@ fn ask(ledger: &Ledger, writer: &mut Writer, asked: Asked) -> Result<Noted, Prob
 }
 
 #[test]
+fn a_name_of_this_start_is_known_without_its_letters() {
+    let files = SimulatedFiles::new();
+    let (ledger, _) = Ledger::open(Arc::new(files), Path::new("/store/service")).unwrap();
+    let name = ledger.next_id('m');
+    assert_eq!(ledger.whole_name(&name), name);
+    assert_eq!(ledger.whole_name("m1-1"), name);
+    for other in ["m2-1", "m11-1", "", "m", "x"] {
+        assert_eq!(ledger.whole_name(other), other);
+    }
+}
+
+#[test]
 fn a_request_is_known_after_a_restart() {
     let files = SimulatedFiles::new();
     let (first, mut writer) = open(&files);
