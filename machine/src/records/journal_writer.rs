@@ -52,10 +52,10 @@ impl Store {
         Journal::resume_by(&self.door, path, header, hash)
     }
 
-    /// [`read_journal`] of this store.
+    /// [`read_journal`](super::read_journal) of this store.
     ///
     /// # Errors
-    /// Those of [`read_journal`].
+    /// Those of [`read_journal`](super::read_journal).
     pub fn read_journal<L: Log>(&self, path: &Path) -> Result<ReadJournal<L>, StoreError> {
         read_by(&self.door, path)
     }
