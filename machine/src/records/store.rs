@@ -20,7 +20,7 @@ use super::{SCHEMA_VERSION, StoreError, io_error, short, unsound};
 /// ```
 /// use machine::records::sound::{Judged, counted};
 /// use machine::records::{CalibrationRecord, Content, ContentKind, RecordHead, Store};
-/// use serde::Deserialize;
+/// use serde::{Deserialize, Serialize};
 ///
 /// #[derive(Debug, PartialEq, Serialize, Deserialize)]
 /// struct Note {
