@@ -8,8 +8,6 @@ mod runs;
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -25,6 +23,7 @@ use crate::keeper::stopped_by;
 use crate::ledger::{Asked, AskedMotion, End, Ledger, Noted, WRITE_LIMIT};
 use crate::order::{Answer, Answered, Letter, Order, Reply, Unanswered};
 use crate::problem::{Code, Problem};
+use crate::random::{draw_bytes, write_hex};
 use crate::request::{Caller, JogRequest, LeaseRequest, MoveRequest, StopMode};
 use crate::snapshot::{Beat, Board, Fixed, Snapshot};
 use crate::stops::{Arrival, Stops};
@@ -419,12 +418,11 @@ impl Desk {
     }
 
     pub(crate) fn lease_order(request: &LeaseRequest) -> Result<Order, Problem> {
-        let mut bytes = [0; 16];
-        let read = File::open("/dev/urandom").and_then(|mut it| it.read_exact(&mut bytes));
-        read.map_err(|it| Problem::new(Code::Storage, format!("/dev/urandom: {it}"), ""))?;
+        let bytes = draw_bytes::<16>();
+        let bytes = bytes.map_err(|error| Problem::new(Code::Storage, error.to_string(), ""))?;
         Ok(Order::Lease {
             request: request.clone(),
-            token: bytes.iter().map(|it| format!("{it:02x}")).collect(),
+            token: write_hex(&bytes),
         })
     }
 

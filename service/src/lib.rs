@@ -19,6 +19,7 @@ mod manager;
 mod order;
 mod problem;
 mod quantity;
+mod random;
 mod request;
 mod scribe;
 mod snapshot;

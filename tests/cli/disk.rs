@@ -138,12 +138,12 @@ fn no_verb_waits_for_a_file_with_a_machine_in_hand() {
 fn places_of_calls_are_found() {
     let write = "write(4</dev/pts/1>, \"\\r\", 1) = 1";
     assert_eq!(place(write), Some("/dev/pts/1"));
-    let open = "openat(AT_FDCWD</tmp>, \"data/x.json\", O_RDONLY) = 3</tmp/data/x.json>";
+    let open = "openat(AT_FDCWD</stage>, \"data/x.json\", O_RDONLY) = 3</stage/data/x.json>";
     assert_eq!(place(open), Some("data/x.json"));
     assert_eq!(
-        place("fdatasync(7</tmp/a.jsonl>) = 0"),
-        Some("/tmp/a.jsonl")
+        place("fdatasync(7</stage/a.jsonl>) = 0"),
+        Some("/stage/a.jsonl")
     );
-    let trace = "1 write(4</dev/pts/1>, \"t0800\", 5) = 5\n2 fsync(7</tmp/a>) = 0\n1 fsync(7</tmp/a>) = 0\n";
-    assert_eq!(files_of_bus_threads(trace), ["fsync(7</tmp/a>) = 0"]);
+    let trace = "1 write(4</dev/pts/1>, \"t0800\", 5) = 5\n2 fsync(7</stage/a>) = 0\n1 fsync(7</stage/a>) = 0\n";
+    assert_eq!(files_of_bus_threads(trace), ["fsync(7</stage/a>) = 0"]);
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use machine::records::files::{Files, OpenFile, OsFiles};
+use machine::records::files::{Call, OsFiles, Watch, WatchedFiles};
 use machine::records::{DiskPace, Store, read_journal};
 use tests::Bench;
 use truestage::linear::LinearLog;
@@ -17,7 +17,7 @@ use crate::scene::shortened;
 /// A call, and the part of a path that it is about.
 #[derive(Clone, Copy, Debug)]
 struct Part {
-    call: &'static str,
+    call: Call,
     of_path: &'static str,
 }
 
@@ -29,15 +29,17 @@ struct Refused {
 }
 
 impl Refused {
-    fn set(&self, call: &'static str, of_path: &'static str) {
+    fn set(&self, call: Call, of_path: &'static str) {
         *self.part.lock().unwrap() = Some(Part { call, of_path });
     }
 
     fn clear(&self) {
         *self.part.lock().unwrap() = None;
     }
+}
 
-    fn judge(&self, call: &str, path: &Path) -> io::Result<()> {
+impl Watch for Refused {
+    fn begin_call(&self, call: Call, path: &Path) -> io::Result<()> {
         match *self.part.lock().unwrap() {
             Some(part) if part.call == call && path.to_string_lossy().contains(part.of_path) => {
                 self.was_asked.store(true, Ordering::Relaxed);
@@ -49,44 +51,18 @@ impl Refused {
 }
 
 /// The operating system's files, of which some are refused.
-#[derive(Clone, Debug, Default)]
-struct Refusing {
-    refused: Refused,
-}
+type Refusing = WatchedFiles<OsFiles, Refused>;
 
-impl Files for Refusing {
-    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        OsFiles.read(path)
-    }
-    fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
-        OsFiles.list(folder)
-    }
-    fn make_folder(&self, folder: &Path) -> io::Result<()> {
-        OsFiles.make_folder(folder)
-    }
-    fn create(&self, path: &Path, mode: Option<u32>) -> io::Result<Box<dyn OpenFile>> {
-        self.refused.judge("create", path)?;
-        OsFiles.create(path, mode)
-    }
-    fn open(&self, path: &Path) -> io::Result<Box<dyn OpenFile>> {
-        OsFiles.open(path)
-    }
-    fn mode(&self, path: &Path) -> io::Result<u32> {
-        OsFiles.mode(path)
-    }
-    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
-        OsFiles.identity(path)
-    }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        OsFiles.rename(from, to)
-    }
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        OsFiles.remove(path)
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.refused.judge("sync", folder)?;
-        OsFiles.sync_folder(folder)
-    }
+/// A stage whose store is on a disk that refuses; ordered at `pace`.
+fn bench_on_disk(pace: Option<DiskPace>) -> (Bench, Refusing, Store) {
+    let bench = Bench::with(1, shortened, |text| text);
+    let files = Refusing::default();
+    let direct = bench.store.clone().in_files(Arc::new(files.clone()));
+    let store = match pace {
+        Some(pace) => direct.ordered(pace).unwrap(),
+        None => direct,
+    };
+    (bench, files, store)
 }
 
 fn calibrated(
@@ -108,16 +84,10 @@ fn calibrated(
 /// Calls of `part` are refused after the measurement: the run that goes on stores and uses what it measured.
 #[track_caller]
 fn check_goes_on(part: &'static str, pace: Option<DiskPace>) {
-    let mut bench = Bench::with(1, shortened, |text| text);
-    let files = Refusing::default();
-    let direct = bench.store.clone().in_files(Arc::new(files.clone()));
-    let store = match pace {
-        Some(pace) => direct.ordered(pace).unwrap(),
-        None => direct,
-    };
-    files.refused.set("create", part);
+    let (mut bench, files, store) = bench_on_disk(pace);
+    files.watch.set(Call::Create, part);
     let failure = calibrated(&mut bench.machine, &store, None).unwrap_err();
-    assert!(files.refused.was_asked.load(Ordering::Relaxed), "{part}");
+    assert!(files.watch.was_asked.load(Ordering::Relaxed), "{part}");
     assert!(matches!(failure, Failure::Store(_)), "{part}: {failure:?}");
     assert!(failure.to_string().contains("os error 28"), "{failure}");
     assert_eq!(failure.exit_code(), 2);
@@ -126,7 +96,7 @@ fn check_goes_on(part: &'static str, pace: Option<DiskPace>) {
     let before = read_journal::<LinearLog>(&journal).unwrap();
     assert!(!before.complete, "{part}");
     assert_eq!(before.log.points.len(), 66, "{part}");
-    files.refused.clear();
+    files.watch.clear();
     let id = calibrated(&mut bench.machine, &store, Some(journal.clone())).unwrap();
     assert_eq!(bench.store.active("x").unwrap().current, Some(id), "{part}");
     let after = read_journal::<LinearLog>(&journal).unwrap();
@@ -146,11 +116,8 @@ fn a_measurement_that_cannot_be_stored_is_stored_by_the_next_run() {
 #[test]
 fn a_disk_that_is_full_is_told_before_anything_moves() {
     for pace in [DiskPace::Shared, DiskPace::Wall] {
-        let mut bench = Bench::with(1, shortened, |text| text);
-        let files = Refusing::default();
-        let direct = bench.store.clone().in_files(Arc::new(files.clone()));
-        let store = direct.ordered(pace).unwrap();
-        files.refused.set("create", "");
+        let (mut bench, files, store) = bench_on_disk(Some(pace));
+        files.watch.set(Call::Create, "");
         let truth = |bench: &Bench| bench.emulated.simulation().truth().position();
         let before = truth(&bench);
         let failure = calibrated(&mut bench.machine, &store, None).unwrap_err();
@@ -164,14 +131,8 @@ fn a_disk_that_is_full_is_told_before_anything_moves() {
 #[test]
 fn a_calibration_whose_pointer_is_not_flushed_is_in_use() {
     for pace in [None, Some(DiskPace::Shared), Some(DiskPace::Wall)] {
-        let mut bench = Bench::with(1, shortened, |text| text);
-        let files = Refusing::default();
-        let direct = bench.store.clone().in_files(Arc::new(files.clone()));
-        let store = match pace {
-            Some(pace) => direct.ordered(pace).unwrap(),
-            None => direct,
-        };
-        files.refused.set("sync", "/active");
+        let (mut bench, files, store) = bench_on_disk(pace);
+        files.watch.set(Call::SyncFolder, "/active");
         let failure = calibrated(&mut bench.machine, &store, None).unwrap_err();
         let said = failure.to_string();
         assert!(said.contains("is in use"), "{said}");
@@ -180,7 +141,7 @@ fn a_calibration_whose_pointer_is_not_flushed_is_in_use() {
         assert!(bench.store.active("x").unwrap().current.is_some());
         let mut stage = bench.machine.linear("x").unwrap();
         assert!(stage.compensation().is_some(), "{said}");
-        files.refused.clear();
+        files.watch.clear();
         stage.load_active(&store).unwrap();
     }
 }

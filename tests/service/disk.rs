@@ -1,10 +1,10 @@
 //! A disk that hangs or is full when a test wants it.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-use machine::records::files::{Files, OpenFile, OsFiles};
+use machine::records::files::{Call, Files as _, OpenFile, OsFiles, Watch, WatchedFiles};
 
 use crate::client::PATIENCE;
 
@@ -38,6 +38,14 @@ impl Disk {
     /// From now on no sync ends.
     pub(crate) fn hang(&self) {
         self.state().hangs = true;
+    }
+
+    /// The files on it.
+    pub(crate) fn files(&self) -> WatchedFiles<OsFiles, Self> {
+        WatchedFiles {
+            files: OsFiles,
+            watch: self.clone(),
+        }
     }
 
     /// It goes on.
@@ -87,58 +95,31 @@ impl Disk {
             _ => Ok(taken),
         }
     }
-
-    fn opened(&self, inner: Box<dyn OpenFile>) -> Box<dyn OpenFile> {
-        let disk = self.clone();
-        Box::new(Opened { disk, inner })
-    }
 }
 
-impl Files for Disk {
-    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        OsFiles.read(path)
-    }
-
-    fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
-        OsFiles.list(folder)
-    }
-
-    fn make_folder(&self, folder: &Path) -> io::Result<()> {
-        OsFiles.make_folder(folder)
-    }
-
-    fn create(&self, path: &Path, mode: Option<u32>) -> io::Result<Box<dyn OpenFile>> {
-        OsFiles.create(path, mode).map(|file| self.opened(file))
-    }
-
-    fn open(&self, path: &Path) -> io::Result<Box<dyn OpenFile>> {
-        OsFiles.open(path).map(|file| self.opened(file))
-    }
-
-    fn mode(&self, path: &Path) -> io::Result<u32> {
-        OsFiles.mode(path)
-    }
-
-    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
-        OsFiles.identity(path)
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        OsFiles.rename(from, to)
-    }
-
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        let length = OsFiles.open(path).and_then(|file| file.length());
-        OsFiles.remove(path)?;
-        if let Some(room) = &mut self.state().room {
-            *room += usize::try_from(length?).unwrap_or(0);
+impl Watch for Disk {
+    fn begin_call(&self, call: Call, path: &Path) -> io::Result<()> {
+        match call {
+            Call::Remove => {
+                let length = OsFiles.open(path).and_then(|file| file.length());
+                if let (Some(room), Ok(length)) = (&mut self.state().room, length) {
+                    *room += usize::try_from(length).unwrap_or(0);
+                }
+            }
+            Call::SyncFolder => self.sync(),
+            Call::Read
+            | Call::List
+            | Call::MakeFolder
+            | Call::Create
+            | Call::Open
+            | Call::Rename => {}
         }
         Ok(())
     }
 
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.sync();
-        OsFiles.sync_folder(folder)
+    fn take_file(&self, inner: Box<dyn OpenFile>) -> Box<dyn OpenFile> {
+        let disk = self.clone();
+        Box::new(Opened { disk, inner })
     }
 }
 

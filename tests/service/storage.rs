@@ -29,7 +29,7 @@ fn anna() -> Caller {
 }
 
 fn stage_on(disk: &Disk, folder: &Path) -> Stage {
-    Stage::on_disk(Arc::new(disk.clone()), (LINEAR, 51), folder, |text| {
+    Stage::on_disk(Arc::new(disk.files()), (LINEAR, 51), folder, |text| {
         text.edit("move_timeout_s = 10.0", "move_timeout_s = 10000.0")
     })
 }

@@ -5,14 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
-use std::time::Duration;
 
 use machine::records::DiskPace;
 
+use super::streams::END_LIMIT;
+
 /// So many blocks may wait: of 8 KiB each, minutes of a full bus.
 const BLOCKS: usize = 2048;
-/// A disk that hangs keeps nobody waiting at the end.
-const AT_THE_END: Duration = Duration::from_secs(1);
 
 /// The end at which is written. A disk that does not keep up, or fails, ends the file: it has no holes.
 #[derive(Debug)]
@@ -83,7 +82,7 @@ impl Drop for Behind {
     fn drop(&mut self) {
         self.blocks = None;
         // What is not written by then is not waited for.
-        let _ = self.ended.recv_timeout(AT_THE_END);
+        let _ = self.ended.recv_timeout(END_LIMIT);
     }
 }
 

@@ -17,6 +17,7 @@ use crate::program::behind::Behind;
 use crate::program::output::Output;
 use crate::program::progress::Bars;
 use crate::program::signals::stop_on_signals;
+use crate::program::streams::END_LIMIT;
 use crate::program::{AxisArgs, MachineArgs};
 use crate::{Failure, Machine, assemble};
 use machine::records::Store;
@@ -37,13 +38,10 @@ pub(crate) struct Session {
 /// The records of a machine; what was ordered at last is waited for when this is dropped.
 pub(crate) struct Records(Store);
 
-/// A disk that hangs keeps nobody waiting at the end.
-const AT_THE_END: Duration = Duration::from_secs(1);
-
 impl Drop for Records {
     fn drop(&mut self) {
         let begun = Instant::now();
-        while self.0.waiting() > 0 && begun.elapsed() < AT_THE_END {
+        while self.0.waiting() > 0 && begun.elapsed() < END_LIMIT {
             thread::sleep(Duration::from_millis(1));
         }
     }

@@ -26,8 +26,8 @@ use crate::Failure;
 const WAITING_MAX: usize = 1024;
 /// Signs of progress leave the rest of that to lines, which are said once.
 const SIGNS_WAITING_MAX: usize = 64;
-/// How long a program that owns a machine waits at its end for a reader.
-const END_LIMIT: Duration = Duration::from_secs(1);
+/// How long a program that owns a machine waits at its end for a reader, or for a disk.
+pub(super) const END_LIMIT: Duration = Duration::from_secs(1);
 /// A reader that takes nothing for so long is named once it takes something again.
 const BLOCKED_MIN: Duration = Duration::from_secs(1);
 
@@ -224,36 +224,32 @@ impl Stream {
         };
         let begun = Instant::now();
         let (reached, awaited) = channel();
-        if self.give_within(limit, Given::Awaited(reached)).is_err() {
-            self.state.is_blocked.store(true, Ordering::Relaxed);
-            return;
-        }
-        let left = limit.saturating_sub(begun.elapsed());
-        if awaited.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
+        let is_written = self.give_within(limit, Given::Awaited(reached)) && {
+            let left = limit.saturating_sub(begun.elapsed());
+            awaited.recv_timeout(left) != Err(RecvTimeoutError::Timeout)
+        };
+        if !is_written {
             self.state.is_blocked.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Gives something to the writer, and waits until its queue has room. A writer that is gone takes nothing.
-    fn give_within(&self, limit: Duration, mut given: Given) -> Result<(), RecvTimeoutError> {
+    /// Gives something to the writer as soon as its queue has room; whether it had. A writer that is gone takes nothing.
+    fn give_within(&self, limit: Duration, mut given: Given) -> bool {
         const LOOK_EVERY: Duration = Duration::from_millis(1);
         let begun = Instant::now();
         self.state.waiting.fetch_add(1, Ordering::Relaxed);
         loop {
-            match self.given.try_send(given) {
-                Ok(()) => return Ok(()),
-                Err(TrySendError::Full(refused)) if begun.elapsed() < limit => given = refused,
-                Err(error) => {
-                    self.state.waiting.fetch_sub(1, Ordering::Relaxed);
-                    let is_full = matches!(error, TrySendError::Full(_));
-                    return if is_full {
-                        Err(RecvTimeoutError::Timeout)
-                    } else {
-                        Ok(())
-                    };
+            let is_full = match self.given.try_send(given) {
+                Ok(()) => return true,
+                Err(TrySendError::Full(refused)) if begun.elapsed() < limit => {
+                    given = refused;
+                    thread::sleep(LOOK_EVERY);
+                    continue;
                 }
-            }
-            thread::sleep(LOOK_EVERY);
+                Err(error) => matches!(error, TrySendError::Full(_)),
+            };
+            self.state.waiting.fetch_sub(1, Ordering::Relaxed);
+            return !is_full;
         }
     }
 

@@ -7,7 +7,7 @@ use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Instant;
@@ -61,13 +61,13 @@ pub(super) struct Shared {
     failure: Mutex<Option<StoreError>>,
 }
 
-fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
     pub(super) fn copy(&self) -> MutexGuard<'_, RecordsCopy> {
-        locked(&self.copy)
+        lock(&self.copy)
     }
 
     fn waiting(&self) -> u64 {
@@ -76,7 +76,7 @@ impl Shared {
     }
 
     fn fail(&self, failure: StoreError) {
-        locked(&self.failure).get_or_insert(failure);
+        lock(&self.failure).get_or_insert(failure);
         self.has_failed.store(true, Ordering::Release);
     }
 
@@ -87,7 +87,7 @@ impl Shared {
         }
         self.turn.fetch_add(1, Ordering::AcqRel);
         self.has_failed.store(false, Ordering::Release);
-        locked(&self.failure).take()
+        lock(&self.failure).take()
     }
 
     /// Takes the records from the disk again. Only for the disk's thread.
@@ -148,12 +148,10 @@ impl Disk {
     fn send(&self, order: Order) -> Result<(), DiskFailure> {
         self.shared.taken.fetch_add(1, Ordering::AcqRel);
         let sent = self.orders.try_send(order);
-        sent.map_err(|refused| {
+        sent.map_err(|_refused| {
             self.shared.done.fetch_add(1, Ordering::AcqRel);
-            match refused {
-                TrySendError::Full(_) | TrySendError::Disconnected(_) => DiskFailure::Behind {
-                    waiting: self.shared.waiting(),
-                },
+            DiskFailure::Behind {
+                waiting: self.shared.waiting(),
             }
         })
     }

@@ -2,86 +2,55 @@
 
 use core::time::Duration;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
 use units::Time;
 
-use super::files::{Fault, Files, OpenFile, SimulatedFiles};
+use super::files::{Call, Fault, Files, SimulatedFiles, Watch, WatchedFiles};
 use super::*;
 use crate::{Machine, Parts, Patience, ask_disk, read_ahead, settle};
 
-/// A disk whose calls wait until it is let go.
+/// What calls wait for.
 #[derive(Clone, Debug)]
-struct Hanging {
-    files: SimulatedFiles,
-    gate: Arc<(Mutex<bool>, Condvar)>,
+struct Gate {
+    is_open: Arc<(Mutex<bool>, Condvar)>,
     calls: Arc<AtomicUsize>,
 }
 
-impl Hanging {
-    fn new() -> Self {
+impl Default for Gate {
+    fn default() -> Self {
         Self {
-            files: SimulatedFiles::new(),
-            gate: Arc::new((Mutex::new(true), Condvar::new())),
+            is_open: Arc::new((Mutex::new(true), Condvar::new())),
             calls: Arc::default(),
         }
     }
+}
 
+impl Gate {
     fn set_open(&self, is_open: bool) {
-        *self.gate.0.lock().unwrap() = is_open;
-        self.gate.1.notify_all();
+        *self.is_open.0.lock().unwrap() = is_open;
+        self.is_open.1.notify_all();
     }
+}
 
-    fn pass(&self) {
+impl Watch for Gate {
+    fn begin_call(&self, _: Call, _: &Path) -> io::Result<()> {
         self.calls.fetch_add(1, Ordering::Relaxed);
-        let open = self.gate.0.lock().unwrap();
-        drop(self.gate.1.wait_while(open, |is_open| !*is_open).unwrap());
+        let open = self.is_open.0.lock().unwrap();
+        drop(
+            self.is_open
+                .1
+                .wait_while(open, |is_open| !*is_open)
+                .unwrap(),
+        );
+        Ok(())
     }
 }
 
-impl Files for Hanging {
-    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        self.pass();
-        self.files.read(path)
-    }
-    fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
-        self.pass();
-        self.files.list(folder)
-    }
-    fn make_folder(&self, folder: &Path) -> io::Result<()> {
-        self.pass();
-        self.files.make_folder(folder)
-    }
-    fn create(&self, path: &Path, mode: Option<u32>) -> io::Result<Box<dyn OpenFile>> {
-        self.pass();
-        self.files.create(path, mode)
-    }
-    fn open(&self, path: &Path) -> io::Result<Box<dyn OpenFile>> {
-        self.pass();
-        self.files.open(path)
-    }
-    fn mode(&self, path: &Path) -> io::Result<u32> {
-        self.files.mode(path)
-    }
-
-    fn identity(&self, path: &Path) -> io::Result<Option<String>> {
-        self.files.identity(path)
-    }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.pass();
-        self.files.rename(from, to)
-    }
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        self.pass();
-        self.files.remove(path)
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.pass();
-        self.files.sync_folder(folder)
-    }
-}
+/// A disk whose calls wait until it is let go.
+type Hanging = WatchedFiles<SimulatedFiles, Gate>;
 
 fn point() -> serde_json::Value {
     serde_json::json!({"entry": "point"})
@@ -119,9 +88,9 @@ fn ordered(files: Arc<dyn Files>) -> Store {
 
 #[test]
 fn a_machine_lives_on_while_its_disk_hangs() {
-    let files = Hanging::new();
+    let files = Hanging::default();
     let store = ordered(Arc::new(files.clone()));
-    files.set_open(false);
+    files.watch.set_open(false);
     let mut machine = machine();
     let mut journal = store.create_journal::<AnyLog>(&header()).unwrap();
     journal.write(&point()).unwrap();
@@ -153,7 +122,7 @@ struct LetGo {
 impl crate::Attendant for LetGo {
     fn attend(&mut self, machine: &mut Machine) -> Result<(), crate::Failure> {
         if machine.now() >= self.at {
-            self.files.set_open(true);
+            self.files.watch.set_open(true);
         }
         Ok(())
     }
@@ -161,27 +130,27 @@ impl crate::Attendant for LetGo {
 
 #[test]
 fn a_stop_is_seen_while_the_disk_hangs() {
-    let files = Hanging::new();
+    let files = Hanging::default();
     let store = ordered(Arc::new(files.clone()));
-    files.set_open(false);
+    files.watch.set_open(false);
     let mut machine = machine();
     drop(store.create_journal::<AnyLog>(&header()).unwrap());
     machine.stop_request().stop();
     let stopped = settle(&mut machine, &store).unwrap_err();
     assert!(stopped.is_stop(), "{stopped}");
-    files.set_open(true);
+    files.watch.set_open(true);
 }
 
 #[test]
 fn a_queue_that_is_full_names_the_disk() {
-    let files = Hanging::new();
+    let files = Hanging::default();
     let store = ordered(Arc::new(files.clone()));
-    files.set_open(false);
+    files.watch.set_open(false);
     let mut journal = store.create_journal::<AnyLog>(&header()).unwrap();
     let refused = (0..10_000).find_map(|_| journal.write(&point()).err());
     let refused = refused.expect("the queue has an end").to_string();
     assert!(refused.contains("disk"), "{refused}");
-    files.set_open(true);
+    files.watch.set_open(true);
 }
 
 #[test]
@@ -211,7 +180,7 @@ fn nothing_is_written_behind_what_failed() {
 
 #[test]
 fn what_is_read_was_read_before() {
-    let files = Hanging::new();
+    let files = Hanging::default();
     let direct = Store::new("/data".as_ref(), "m", &[]).in_files(Arc::new(files.clone()));
     let mut journal = direct.create_journal::<AnyLog>(&header()).unwrap();
     journal.complete().unwrap();
@@ -219,12 +188,12 @@ fn what_is_read_was_read_before() {
     let store = direct.ordered(DiskPace::Wall).unwrap();
     let mut machine = machine();
     read_ahead(&mut machine, &store, journal.path().to_owned()).unwrap();
-    let calls = files.calls.load(Ordering::Relaxed);
+    let calls = files.watch.calls.load(Ordering::Relaxed);
     assert_eq!(store.active("x").unwrap().current, None);
     assert_eq!(store.read_zero_note("x").as_deref(), Some("noted"));
     let newest = store.newest_run("calibrate", "x").unwrap().unwrap();
     assert!(store.read_journal::<AnyLog>(&newest).unwrap().complete);
-    assert_eq!(files.calls.load(Ordering::Relaxed), calls);
+    assert_eq!(files.watch.calls.load(Ordering::Relaxed), calls);
     // A zero that is lost is not believed, whatever the disk does.
     store.hide_zero_note("x");
     assert_eq!(store.read_zero_note("x"), None);

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::disk::{Disk, Shared};
+use super::disk::{Answer, Disk, Shared};
 use super::files::{Files, os_files};
 use super::{StoreError, remove_file, replace_file};
 
@@ -40,10 +40,8 @@ impl Door {
         if let Some(content) = disk.shared().copy().content(path) {
             return content;
         }
-        let (files, path) = (Arc::clone(self.files()), path.to_owned());
-        disk.ask(move || files.read(&path))
-            .and_then(super::disk::Answer::wait)
-            .map_err(io::Error::other)?
+        let path = path.to_owned();
+        ask_files(disk, move |files| files.read(&path))
     }
 
     /// The names in `folder`.
@@ -54,10 +52,8 @@ impl Door {
         if let Some(names) = disk.shared().copy().names(folder) {
             return Ok(names);
         }
-        let (files, folder) = (Arc::clone(self.files()), folder.to_owned());
-        disk.ask(move || files.list(&folder))
-            .and_then(super::disk::Answer::wait)
-            .map_err(io::Error::other)?
+        let folder = folder.to_owned();
+        ask_files(disk, move |files| files.list(&folder))
     }
 
     /// Does `change`, or orders it: then its failure is heard later.
@@ -125,4 +121,14 @@ impl Door {
         }
         removed
     }
+}
+
+/// Waits for what the disk's thread finds.
+fn ask_files<R: Send + 'static>(
+    disk: &Disk,
+    look: impl FnOnce(&dyn Files) -> io::Result<R> + Send + 'static,
+) -> io::Result<R> {
+    let files = Arc::clone(&disk.shared().files);
+    let asked = disk.ask(move || look(&*files));
+    asked.and_then(Answer::wait).map_err(io::Error::other)?
 }

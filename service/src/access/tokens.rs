@@ -3,10 +3,9 @@
 //! A token is 256 random bits, so its hash is a plain SHA-256: nobody can try so many, and a slow hash with a salt,
 //! which words that people choose need, would only let whoever asks keep the computer busy.
 
-use core::fmt::Write as _;
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
-use std::io::{self, Read, Write as _};
+use std::io::{self, Write as _};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +14,7 @@ use serde::Deserialize;
 
 use super::role::{Role, RoleError};
 use super::secret_file::{SecretError, check, io_of, read};
+use crate::random::{draw_bytes, write_hex};
 
 /// So many random bytes a token has.
 const RANDOM: usize = 32;
@@ -83,7 +83,7 @@ pub enum TokenError {
     #[error(transparent)]
     Role(#[from] RoleError),
     /// The system has no random numbers.
-    #[error("/dev/urandom: {0}")]
+    #[error("no token can be made: {0}")]
     Random(io::Error),
 }
 
@@ -196,8 +196,9 @@ pub fn add_token(path: &Path, name: &str, role: &str, made: &str) -> Result<Stri
             });
         }
     }
-    let token = random().map_err(TokenError::Random)?;
-    let hash = hex(&hash_of(&token));
+    let token = draw_bytes::<RANDOM>().map_err(TokenError::Random)?;
+    let token = write_hex(&token);
+    let hash = write_hex(&hash_of(&token));
     let head = if is_new { HEAD } else { "" };
     let entry = format!(
         "{head}\n[[token]]\nname = \"{name}\"\nrole = \"{role}\"\nsha256 = \"{hash}\"\nmade = \"{made}\"\n"
@@ -223,25 +224,10 @@ fn is_name(name: &str) -> bool {
         && name.chars().all(is_plain)
 }
 
-fn random() -> io::Result<String> {
-    let mut bytes = [0; RANDOM];
-    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
-    Ok(hex(&bytes))
-}
-
 fn hash_of(token: &str) -> [u8; 32] {
     let mut hash = [0; 32];
     hash.copy_from_slice(digest::digest(&digest::SHA256, token.as_bytes()).as_ref());
     hash
-}
-
-fn hex(bytes: &[u8]) -> String {
-    let mut text = String::new();
-    for byte in bytes {
-        // To write into a text cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
 }
 
 fn bytes_of(hex: &str) -> Option<[u8; 32]> {
@@ -290,7 +276,7 @@ mod tests {
     #[test]
     fn the_hash_is_what_sha256sum_says() {
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(hex(&hash_of("abc")), expected);
+        assert_eq!(write_hex(&hash_of("abc")), expected);
         assert_eq!(bytes_of(expected), Some(hash_of("abc")));
     }
 

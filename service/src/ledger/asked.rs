@@ -1,6 +1,5 @@
 //! Requests that the ledger keeps, and their ends.
 
-use core::fmt::Write as _;
 use std::sync::Arc;
 
 use ring::digest;
@@ -8,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::keeper::utc_now;
 use crate::problem::Code;
+use crate::random::write_hex;
 use crate::request::{MoveRequest, RunKind, RunRequest};
 use crate::view::{Cause, MotionState, MotionView, RunPlanView, RunState, RunView};
 
@@ -198,10 +198,5 @@ fn restarted(thing: &str, help: &str) -> Cause {
 fn hash_of(request: &RunRequest) -> String {
     // What was read from JSON can be written so.
     let text = serde_json::to_vec(request).unwrap_or_default();
-    let mut hash = String::new();
-    for byte in digest::digest(&digest::SHA256, &text).as_ref() {
-        // To write into a text cannot fail.
-        let _ = write!(hash, "{byte:02x}");
-    }
-    hash
+    write_hex(digest::digest(&digest::SHA256, &text).as_ref())
 }

@@ -18,15 +18,6 @@ pub(super) const BALLAST: usize = 1 << 20;
 /// So many folders are made for a machine: `DATA/MACHINE/service`.
 const FOLDERS_MADE: usize = 3;
 
-/// A write that failed.
-#[derive(Debug)]
-pub(super) enum WriteError {
-    /// Nothing of it is in the file.
-    Undone(io::Error),
-    /// It may be in the file or not, also after a power cut.
-    Unknown(io::Error),
-}
-
 /// The file that is written to.
 #[derive(Debug)]
 pub(super) struct LedgerFile {
@@ -102,33 +93,28 @@ impl LedgerFile {
         Ok(())
     }
 
-    /// Writes `bytes` at the end. A crash of the program leaves them there, a power cut perhaps.
-    pub(super) fn write(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+    /// Writes `bytes` at the end. A crash of the program leaves them there, a power cut perhaps. After an error nothing
+    /// of them is in the file, where that is still trusted.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(trusted) = &mut self.open else {
-            return Err(WriteError::Unknown(io::ErrorKind::NotFound.into()));
+            return Err(io::ErrorKind::NotFound.into());
         };
         let Err(error) = write_all(&mut *trusted.file, bytes) else {
             trusted.length += bytes.len() as u64;
             return Ok(());
         };
         let cut = trusted.file.set_len(trusted.length);
-        match cut.and_then(|()| trusted.file.sync()) {
-            Ok(()) => Err(WriteError::Undone(error)),
-            Err(_) => {
-                self.open = None;
-                Err(WriteError::Unknown(error))
-            }
+        if cut.and_then(|()| trusted.file.sync()).is_err() {
+            self.open = None;
         }
+        Err(error)
     }
 
     /// Makes what was written durable.
-    pub(super) fn sync(&mut self) -> Result<(), WriteError> {
+    pub(super) fn sync(&mut self) -> io::Result<()> {
         let synced = self.open.as_mut().map(|trusted| trusted.file.sync());
         let synced = synced.unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
-        synced.map_err(|error| {
-            self.open = None;
-            WriteError::Unknown(error)
-        })
+        synced.inspect_err(|_| self.open = None)
     }
 
     /// Gives the room of the ballast away.

@@ -11,14 +11,14 @@ use std::time::Instant;
 
 use machine::records::files::Files;
 use machine::records::replace_file;
-use ring::rand::{SecureRandom, SystemRandom};
 
-use super::file::{BALLAST, LedgerFile, WriteError, is_full};
+use super::file::{BALLAST, LedgerFile, is_full};
 use super::health::Health;
 use super::lines::{Line, Reading};
 use super::memory::Memory;
 use super::{Item, ItemOf, Ledger, LedgerError, Note, State, storage};
 use crate::problem::Problem;
+use crate::random::draw_bytes;
 
 /// How often a disk that cannot be written is tried again.
 const RETRY_EVERY: Duration = Duration::from_secs(1);
@@ -276,15 +276,12 @@ impl Writer {
             return Ok(());
         }
         let bytes: String = items.iter().map(|item| item.text.as_str()).collect();
-        match self.file.write(bytes.as_bytes()) {
-            Err(WriteError::Undone(error) | WriteError::Unknown(error)) => {
-                return Err((items, error));
-            }
-            Ok(()) => {}
+        if let Err(error) = self.file.write(bytes.as_bytes()) {
+            return Err((items, error));
         }
         self.settle(&items, |note| !note.needs_sync);
         match self.file.sync() {
-            Err(WriteError::Undone(error) | WriteError::Unknown(error)) => {
+            Err(error) => {
                 let mut unsettled = items;
                 unsettled
                     .retain(|item| !matches!(&item.of, ItemOf::Note(note) if !note.needs_sync));
@@ -396,10 +393,7 @@ fn name_of(path: &Path) -> String {
 
 /// Random letters.
 fn letters() -> io::Result<String> {
-    let mut bytes = [0; 8];
-    let filled = SystemRandom::new().fill(&mut bytes);
-    filled.map_err(|_| io::Error::other("the system gives no random numbers"))?;
-    let mut number = u64::from_le_bytes(bytes);
+    let mut number = u64::from_le_bytes(draw_bytes()?);
     let letter = core::iter::repeat_with(|| {
         let letter = b'a' + (number % 26) as u8;
         number /= 26;

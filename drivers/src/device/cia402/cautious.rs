@@ -50,12 +50,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.units_proven = true;
                 self.interrupt_homing(now);
             }
-            Some(Verdict::Speed { factor }) => {
-                let error = self.unit_seen("speed", factor);
-                self.restore(now, Err(error));
-            }
-            Some(Verdict::Acceleration { factor }) => {
-                let error = self.unit_seen("acceleration", factor);
+            Some(Verdict::Differs { what, factor }) => {
+                let error = self.unit_seen(what, factor);
                 self.restore(now, Err(error));
             }
         }
@@ -116,12 +112,8 @@ impl<Q: Coordinate> Cia402Drive<Q> {
                 self.units_proven = true;
                 self.end_tried_move(now, planned, full);
             }
-            Some(Verdict::Speed { factor }) => {
-                let error = self.unit_seen("speed", factor);
-                self.fail_motion(now, error);
-            }
-            Some(Verdict::Acceleration { factor }) => {
-                let error = self.unit_seen("acceleration", factor);
+            Some(Verdict::Differs { what, factor }) => {
+                let error = self.unit_seen(what, factor);
                 self.fail_motion(now, error);
             }
         }

@@ -45,16 +45,18 @@ const WELL_MEASURABLE: i64 = 100;
 /// From the edge to the motion, beside the bus.
 const REACTION: Duration = Duration::from_millis(20);
 
+const SPEED: &str = "speed";
+const ACCELERATION: &str = "acceleration";
+
 /// What a trial showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
     Agrees,
     /// The axis hardly moves: this speed is safe under every unit that remains.
     TooSlow,
-    Speed {
-        factor: f64,
-    },
-    Acceleration {
+    /// `what` is `factor` times what was asked for.
+    Differs {
+        what: &'static str,
         factor: f64,
     },
 }
@@ -175,7 +177,10 @@ impl Trial {
             let factor = way.abs() as f64 / expected;
             return match (is_late, self.is_void) {
                 (true, true) => None,
-                (true, false) => Some(Verdict::Speed { factor }),
+                (true, false) => Some(Verdict::Differs {
+                    what: SPEED,
+                    factor,
+                }),
                 (false, _) => (time >= MOVES_WITHIN).then_some(Verdict::TooSlow),
             };
         }
@@ -193,10 +198,16 @@ impl Trial {
         let speeds_up = ramp > STILL * moving;
         if speeds_up && factor < 1.0 - AGREES {
             let factor = speed.abs() / moving / acceleration;
-            return Some(Verdict::Acceleration { factor });
+            return Some(Verdict::Differs {
+                what: ACCELERATION,
+                factor,
+            });
         }
         if (factor - 1.0).abs() > AGREES {
-            return Some(Verdict::Speed { factor });
+            return Some(Verdict::Differs {
+                what: SPEED,
+                factor,
+            });
         }
         let wanted = asked_speed / acceleration;
         let doubt = AGREES * wanted + 2.0 * delay.as_secs_f64();
@@ -205,7 +216,10 @@ impl Trial {
         let agrees = |ramp: f64| (ramp - wanted).abs() <= doubt;
         if !agrees(ramp) && !agrees(ramp * faster * faster) {
             let factor = wanted / ramp.max(0.01);
-            return Some(Verdict::Acceleration { factor });
+            return Some(Verdict::Differs {
+                what: ACCELERATION,
+                factor,
+            });
         }
         Some(Verdict::Agrees)
     }
@@ -252,13 +266,21 @@ mod tests {
     #[test]
     fn another_unit_is_told_with_its_factor() {
         for unit in [0.1, 0.5, 2.0, 6.17, 10.0] {
-            let Some(Verdict::Speed { factor }) = verdict(unit, unit) else {
+            let Some(Verdict::Differs {
+                what: SPEED,
+                factor,
+            }) = verdict(unit, unit)
+            else {
                 panic!("{unit}: {:?}", verdict(unit, unit))
             };
             assert!((factor / unit - 1.0).abs() < 0.05, "{unit}: {factor}");
         }
         for unit in [0.1, 0.3, 3.0, 10.0] {
-            let Some(Verdict::Acceleration { factor }) = verdict(1.0, unit) else {
+            let Some(Verdict::Differs {
+                what: ACCELERATION,
+                factor,
+            }) = verdict(1.0, unit)
+            else {
                 panic!("{unit}: {:?}", verdict(1.0, unit))
             };
             assert!((0.5..2.0).contains(&(factor / unit)), "{unit}: {factor}");

@@ -110,15 +110,15 @@ fn explain(path: &str, error: tokio_serial::Error) -> SerialError {
 
 /// What to do where a line cannot be opened. tokio-serial folds every cause into "no device": ask the file system.
 fn help_for(path: &str) -> &'static str {
-    match std::fs::metadata(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
-            "no permission; add the user to the group of the device (often `dialout`)"
-        }
-        Err(_) => "`ls /dev/serial/by-id` lists what is plugged in",
-        Ok(_) if File::open(path).is_err_and(|e| is_denied(&e)) => {
-            "no permission; add the user to the group of the device (often `dialout`)"
-        }
-        Ok(_) => IN_USE,
+    let found = std::fs::metadata(path);
+    if found.as_ref().is_err_and(is_denied)
+        || File::open(path).is_err_and(|error| is_denied(&error))
+    {
+        "no permission; add the user to the group of the device (often `dialout`)"
+    } else if found.is_err() {
+        "`ls /dev/serial/by-id` lists what is plugged in"
+    } else {
+        IN_USE
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod os;
 mod simulated;
+mod watched;
 
 use core::fmt::Debug;
 use std::io;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 
 pub use os::OsFiles;
 pub use simulated::{Fault, SimulatedFiles};
+pub use watched::{Call, Watch, WatchedFiles};
 
 /// The files that records are kept in. Each call is one of the operating system's, apart from
 /// [`Files::make_folder`].

@@ -231,10 +231,6 @@ pub(super) async fn accept_ledger(
     Of(state): Of<State>,
     By(caller): By,
 ) -> Result<Json<Done>, Problem> {
-    let desk = state.desk;
-    // It waits for the disk: others are served meanwhile.
-    let accepting = tokio::task::spawn_blocking(move || desk.accept_damaged_ledger(&caller));
-    let accepted = accepting.await;
-    accepted.map_err(|error| Problem::new(Code::Storage, error.to_string(), ""))??;
+    from_disk(state, move |desk| desk.accept_damaged_ledger(&caller)).await?;
     Ok(DONE)
 }

@@ -92,6 +92,25 @@ fn over(dice: &mut Dice, low: f64, high: f64) -> f64 {
 /// A search accelerates and brakes with this share of what its axis can do.
 const HOMING_SHARE: f64 = 0.1;
 
+/// The keys of a motion by its unit.
+struct MotionKeys {
+    speed: &'static str,
+    acceleration: &'static str,
+    quick_stop: &'static str,
+}
+
+const MILLIMETRES: MotionKeys = MotionKeys {
+    speed: "speed_mm_per_s",
+    acceleration: "acceleration_mm_per_s2",
+    quick_stop: "quick_stop_deceleration_mm_per_s2",
+};
+
+const DEGREES: MotionKeys = MotionKeys {
+    speed: "speed_deg_per_s",
+    acceleration: "acceleration_deg_per_s2",
+    quick_stop: "quick_stop_deceleration_deg_per_s2",
+};
+
 /// What a servo can do, and what is asked of it, in mm (or degrees) and seconds.
 struct Servo {
     speed: f64,
@@ -128,6 +147,16 @@ impl Servo {
     fn reference_max(&self) -> f64 {
         const ROOM_MM: f64 = 0.7;
         (2.0 * HOMING_SHARE * self.acceleration.max(self.quick_stop) * ROOM_MM).sqrt()
+    }
+
+    /// The keys of a machine file: `others`, and what is asked of the servo.
+    fn machine_keys(&self, units: MotionKeys, mut others: Keys) -> Keys {
+        others.extend([
+            (units.speed, format!("{:?}", self.speed)),
+            (units.acceleration, format!("{:?}", self.acceleration)),
+            (units.quick_stop, format!("{:?}", self.quick_stop)),
+        ]);
+        others
     }
 
     fn plant_keys(&self) -> Keys {
@@ -180,23 +209,17 @@ fn draw_linear(dice: &mut Dice) -> Drawn {
             speed: servo.speed * 1e-3,
             ..LINEAR_STAGE
         },
-        machine: vec![
-            ("sync_period_ms", period_ms(dice)),
-            ("speed_mm_per_s", format!("{:?}", servo.speed)),
-            (
-                "acceleration_mm_per_s2",
-                format!("{:?}", servo.acceleration),
-            ),
-            (
-                "quick_stop_deceleration_mm_per_s2",
-                format!("{:?}", servo.quick_stop),
-            ),
-            ("following_error_limit_um", format!("{limit_um:?}")),
-            ("position_window_um", format!("{window_um:?}")),
-            ("reference_speed_mm_per_s", format!("{:?}", reference)),
-            ("move_timeout_s", "60.0".into()),
-            ("resolution_nm", resolution),
-        ],
+        machine: servo.machine_keys(
+            MILLIMETRES,
+            vec![
+                ("sync_period_ms", period_ms(dice)),
+                ("following_error_limit_um", format!("{limit_um:?}")),
+                ("position_window_um", format!("{window_um:?}")),
+                ("reference_speed_mm_per_s", format!("{:?}", reference)),
+                ("move_timeout_s", "60.0".into()),
+                ("resolution_nm", resolution),
+            ],
+        ),
         emulated,
     }
 }
@@ -224,21 +247,15 @@ fn draw_rotary(dice: &mut Dice) -> Drawn {
             speed: servo.speed.to_radians(),
             ..ROTARY_TABLE
         },
-        machine: vec![
-            ("sync_period_ms", period_ms(dice)),
-            ("speed_deg_per_s", format!("{:?}", servo.speed)),
-            (
-                "acceleration_deg_per_s2",
-                format!("{:?}", servo.acceleration),
-            ),
-            (
-                "quick_stop_deceleration_deg_per_s2",
-                format!("{:?}", servo.quick_stop),
-            ),
-            ("following_error_limit_arcsec", format!("{limit:?}")),
-            ("position_window_arcsec", format!("{window:?}")),
-            ("index_speed_deg_per_s", format!("{:?}", reference)),
-        ],
+        machine: servo.machine_keys(
+            DEGREES,
+            vec![
+                ("sync_period_ms", period_ms(dice)),
+                ("following_error_limit_arcsec", format!("{limit:?}")),
+                ("position_window_arcsec", format!("{window:?}")),
+                ("index_speed_deg_per_s", format!("{:?}", reference)),
+            ],
+        ),
         emulated,
     }
 }
@@ -269,21 +286,15 @@ fn draw_volumetric(dice: &mut Dice) -> Drawn {
             speed: servo.speed * 1e-3,
             ..THREE_AXES
         },
-        machine: vec![
-            ("sync_period_ms", format!("{period_ms:?}")),
-            ("speed_mm_per_s", format!("{:?}", servo.speed)),
-            (
-                "acceleration_mm_per_s2",
-                format!("{:?}", servo.acceleration),
-            ),
-            (
-                "quick_stop_deceleration_mm_per_s2",
-                format!("{:?}", servo.quick_stop),
-            ),
-            ("following_error_limit_um", format!("{limit_um:?}")),
-            ("deviation_limit_um", format!("{limit_um:?}")),
-            ("position_window_um", format!("{window_um:?}")),
-        ],
+        machine: servo.machine_keys(
+            MILLIMETRES,
+            vec![
+                ("sync_period_ms", format!("{period_ms:?}")),
+                ("following_error_limit_um", format!("{limit_um:?}")),
+                ("deviation_limit_um", format!("{limit_um:?}")),
+                ("position_window_um", format!("{window_um:?}")),
+            ],
+        ),
         emulated,
     }
 }
@@ -304,20 +315,14 @@ fn draw_platform(dice: &mut Dice) -> (Keys, Keys) {
             format!("{:?}", window_um * over(dice, 10.0, 60.0)),
         ),
     ]);
-    let machine = vec![
-        ("sync_period_ms", period_ms(dice)),
-        ("speed_mm_per_s", format!("{:?}", servo.speed)),
-        (
-            "acceleration_mm_per_s2",
-            format!("{:?}", servo.acceleration),
-        ),
-        (
-            "quick_stop_deceleration_mm_per_s2",
-            format!("{:?}", servo.quick_stop),
-        ),
-        ("following_error_limit_um", format!("{limit_um:?}")),
-        ("position_window_um", format!("{window_um:?}")),
-    ];
+    let machine = servo.machine_keys(
+        MILLIMETRES,
+        vec![
+            ("sync_period_ms", period_ms(dice)),
+            ("following_error_limit_um", format!("{limit_um:?}")),
+            ("position_window_um", format!("{window_um:?}")),
+        ],
+    );
     (machine, emulated)
 }
 
