@@ -156,7 +156,7 @@ fn mark_and_note(machine: &mut Machine, at: usize) -> Result<Result<(), String>,
     let noted = ask_disk(machine, &store, move |store| {
         store.write_zero_note(&axis, text)
     })?;
-    Ok(noted.map_err(|it| it.to_string()))
+    Ok(noted.map_err(|error| error.to_string()))
 }
 
 /// The axis has no zero any more, or is about to be moved somewhere else by a search for it. Also of a drive that proves

@@ -165,7 +165,7 @@ impl Desk {
     /// Says among the events what a person should look after.
     pub(crate) fn warn(&self, texts: Vec<String>) {
         for text in texts {
-            // A machine that has ended has nobody to tell.
+            // A machine that has ended hears nothing.
             let _ = self.give(&Caller::default(), Order::Warn { text });
         }
     }

@@ -1,7 +1,7 @@
 //! Ledger: which request is which motion or run, over restarts and power cuts.
 //!
 //! Requests are noted in memory, under a lock that is never held over I/O, and wait for one thread that writes
-//! ([`Writer`]). Whoever waits for it gives up after [`WRITE_LIMIT`]. The decision is
+//! ([`Writer`]). A request gives up after [`WRITE_LIMIT`]. The decision is
 //! `docs/decisions/0074-one-thread-writes-the-ledger.md`.
 
 mod asked;
@@ -33,7 +33,7 @@ use lines::Line;
 use memory::{Known, Memory};
 pub(crate) use writer::Writer;
 
-/// A write that takes longer has failed for whoever waits for it.
+/// A write that takes longer has failed for its request.
 pub(crate) const WRITE_LIMIT: Duration = Duration::from_secs(2);
 /// How often a request looks whether another one with its key is on the disk.
 const LOOK_EVERY: Duration = Duration::from_millis(1);

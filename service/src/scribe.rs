@@ -58,7 +58,7 @@ impl Scribe {
         Ok(())
     }
 
-    /// Writes the rest and ends. A disk that hangs keeps nobody.
+    /// Writes the rest and ends. A disk that hangs is not waited for.
     pub(crate) fn finish(self) {
         self.over.store(true, Ordering::Release);
         let until = Instant::now() + WRITE_LIMIT;

@@ -20,7 +20,7 @@ pub(crate) struct Stops {
     arrived: Sender<Stopped>,
 }
 
-/// What the machine's thread knows of them. It waits for nobody.
+/// What the machine's thread knows of them. It waits for nothing.
 #[derive(Debug)]
 pub(crate) struct StopWatch {
     stops: Arc<Stops>,
@@ -50,7 +50,7 @@ impl Stops {
 
     /// A stop arrives.
     pub(crate) fn arrive(&self, stopped: Stopped) {
-        // Who it is must be known before it counts. Where nobody listens the machine's thread has ended.
+        // Who it is must be known before it counts. Where no thread listens the machine's thread has ended.
         let _ = self.arrived.send(stopped);
         self.count.fetch_add(1, Ordering::SeqCst);
     }

@@ -177,7 +177,7 @@ fn keep(
     let groups = groups(machine.config());
     let fixed = Arc::new(fixed(&mut machine, &groups)?);
     let seats = seats(&mut machine, &groups)?;
-    let judges = Judges::of(&mut machine, &groups)?;
+    let judges = Judges::collect(&mut machine, &groups)?;
     let mut keeper = Keeper::new(inbox, stops, input, seats, teller.clone());
     keeper.add_groups(&mut machine, groups);
     machine.observe(Box::new(keeper.note_taker()));

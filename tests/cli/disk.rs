@@ -30,14 +30,21 @@ fn place(call: &str) -> Option<&str> {
     let by_name = [
         "open", "creat", "rename", "unlink", "mkdir", "stat", "readlink", "truncate",
     ];
-    let is_named = by_name.iter().any(|it| name.contains(it)) && name != "ftruncate";
+    let is_named = by_name.iter().any(|part| name.contains(part)) && name != "ftruncate";
     let named = is_named.then(|| rest.split('"').nth(1)).flatten();
-    let of_descriptor = || rest.split_once('<')?.1.split_once('>').map(|it| it.0);
-    named.filter(|it| !it.is_empty()).or_else(of_descriptor)
+    let of_descriptor = || {
+        rest.split_once('<')?
+            .1
+            .split_once('>')
+            .map(|(place, _)| place)
+    };
+    named
+        .filter(|place| !place.is_empty())
+        .or_else(of_descriptor)
 }
 
 fn is_file(place: &str) -> bool {
-    !NO_FILES.iter().any(|it| place.starts_with(it))
+    !NO_FILES.iter().any(|begin| place.starts_with(begin))
 }
 
 /// Calls on files by threads that write to a bus, once the first of them has sent something.
@@ -59,7 +66,7 @@ fn files_of_bus_threads(trace: &str) -> Vec<String> {
             of_threads.entry(thread).or_default().push(call.to_owned());
         }
     }
-    assert!(!sends.is_empty(), "nobody sent anything:\n{trace}");
+    assert!(!sends.is_empty(), "no frame was sent:\n{trace}");
     of_threads.into_values().flatten().collect()
 }
 
@@ -75,7 +82,7 @@ fn can_trace() -> bool {
             "true",
         ])
         .status();
-    traced.is_ok_and(|it| it.success())
+    traced.is_ok_and(|status| status.success())
 }
 
 #[track_caller]

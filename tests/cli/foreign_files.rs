@@ -1,4 +1,4 @@
-//! What somebody has put into the folder of the journals, as clients of the service meet it.
+//! Strange files in the folder of the journals, as clients of the service meet them.
 
 use std::fs;
 use std::path::Path;

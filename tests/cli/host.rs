@@ -1,4 +1,4 @@
-//! What a computer does to a program that owns a machine: blocked output, limits, files that are full.
+//! Troubles of a computer beside a program that owns a machine: blocked output, limits, files that are full.
 
 use core::time::Duration;
 use std::fs::File;
@@ -24,7 +24,7 @@ const JOG: [&str; 3] = ["jog", "machine.toml", "c=20deg/s"];
 /// Noise of a table that stands, in a second.
 const STANDS_DEG: f64 = 1e-3;
 
-/// A pipe that takes nothing more, and the end that nobody reads.
+/// A pipe that takes nothing more, and the end that is not read.
 fn full_pipe() -> (OwnedFd, Stdio) {
     let (unread, full) = pipe().expect("a pipe");
     let blocking = fcntl(full.as_fd(), FcntlArg::F_GETFL).expect("it has flags");
@@ -115,7 +115,7 @@ fn a_reader_that_comes_back_reads_what_was_blocked() {
     let mut command = bench.verb(&["calibrate", "machine.toml"]);
     command.stdin(Stdio::null()).stdout(Stdio::piped());
     let process = Process::spawn(command.stderr(full));
-    // The pipe ends with whoever has its other end.
+    // The pipe ends with the program that has its other end.
     drop(command);
     let mut said = String::new();
     let ended = thread::spawn(move || process.end().code);
@@ -286,7 +286,7 @@ fn a_motion_fails_when_its_table_stands() {
     assert_eq!(seen, ["moving", "stopping"]);
 }
 
-/// A computer that froze, or a drive that did: nobody knows where the axis is.
+/// A computer that froze, or a drive that did: the place of the axis is not known.
 #[test]
 fn values_of_a_silent_drive_are_unknown() {
     let (_service, motion, mut table) = turning();

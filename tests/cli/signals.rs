@@ -125,7 +125,7 @@ fn a_terminal_that_closes_leaves_no_table_turning() {
     let end = || Stdio::from(terminal.slave.try_clone().expect("a descriptor"));
     command.stdin(end()).stdout(end()).stderr(end());
     let mut process = Process::spawn(&mut command);
-    // The terminal is gone with whoever has its other end.
+    // The terminal is gone with the program that has its other end.
     drop((command, terminal.slave));
     table.until_jogging(&mut process);
     drop(terminal.master);

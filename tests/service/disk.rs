@@ -61,7 +61,7 @@ impl Disk {
             .changed
             .wait_timeout_while(self.state(), PATIENCE, |state| state.hanging == 0);
         let timed_out = waited.unwrap_or_else(PoisonError::into_inner).1.timed_out();
-        assert!(!timed_out, "nobody writes");
+        assert!(!timed_out, "nothing writes");
     }
 
     /// No byte more has room.

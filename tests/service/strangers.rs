@@ -129,7 +129,7 @@ fn the_description_says_where_each_parameter_stands_and_what_a_quantity_is() {
                 parameters.any(|parameter| parameter["name"] == name)
             };
             let is_order = method != "get";
-            // Whoever waits keeps his lease.
+            // A wait keeps its lease.
             let expected = is_order || has("wait_s");
             assert_eq!(has("Truestage-Lease"), expected, "{method} {path}");
             orders += u32::from(is_order);

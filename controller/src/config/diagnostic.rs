@@ -33,7 +33,7 @@ impl Diagnostic {
         cause: String,
         help: String,
     ) -> Self {
-        let (line, column) = LineStarts::of(text).place_of(span.start);
+        let (line, column) = LineStarts::find(text).place_of(span.start);
         Self {
             file: file.to_owned(),
             line,
@@ -52,7 +52,7 @@ pub(super) struct LineStarts<'a> {
 }
 
 impl<'a> LineStarts<'a> {
-    pub(super) fn of(text: &'a str) -> Self {
+    pub(super) fn find(text: &'a str) -> Self {
         let ends = text.match_indices('\n').map(|(at, _)| at + 1);
         Self {
             text,

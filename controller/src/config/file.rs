@@ -17,8 +17,8 @@ pub(crate) struct ConfigFile {
 }
 
 impl ConfigFile {
-    /// The file at `path`, which has just been read as `text`.
-    pub(super) fn of(path: &Path, text: ConfigHash) -> Self {
+    /// Notes that the file at `path` was read now, as `text`.
+    pub(super) fn note_read(path: &Path, text: ConfigHash) -> Self {
         Self {
             path: path.to_owned(),
             text,
@@ -26,7 +26,7 @@ impl ConfigFile {
         }
     }
 
-    /// That the file says something else by now, for whoever goes on with what it said. Reads the disk.
+    /// Says that the file has another text by now than the one in use. Reads the disk.
     pub(super) fn change(&self) -> Option<String> {
         let (path, read_at) = (self.path.display(), &self.read_at);
         let what = match whole::text_of(&self.path) {

@@ -61,7 +61,7 @@ pub fn load(path: &Path) -> Result<Loaded, ConfigError> {
     // same calibrations and take the same lease.
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut loaded = parse_at(&text, &path.display().to_string(), Some(folder))?;
-    loaded.config.file = Some(ConfigFile::of(path, loaded.text.clone()));
+    loaded.config.file = Some(ConfigFile::note_read(path, loaded.text.clone()));
     let section = &mut loaded.config.machine;
     section.data_dir = folder.join(&section.data_dir);
     Ok(loaded)
@@ -343,7 +343,7 @@ fn placed(
     file: &str,
     findings: impl Iterator<Item = (Finding, Part)>,
 ) -> Vec<Diagnostic> {
-    let (places, lines) = (Places::of(text), LineStarts::of(text));
+    let (places, lines) = (Places::of(text), LineStarts::find(text));
     let placed = findings.map(|(finding, part)| {
         let span = places.span_of(&finding.key, part).unwrap_or(0..0);
         let (line, column) = lines.place_of(span.start);

@@ -76,7 +76,7 @@ pub struct MachineSection {
 }
 
 impl MachineConfig {
-    /// That its file says something else by now, for whoever goes on with what it said. Reads the disk.
+    /// Says that its file has another text by now than the one in use. Reads the disk.
     pub fn change_of_file(&self) -> Option<String> {
         self.file.as_ref().and_then(ConfigFile::change)
     }

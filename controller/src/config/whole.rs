@@ -124,7 +124,7 @@ pub(super) fn no_machine(text: &str, file: &str) -> Option<ConfigError> {
 /// So many sections a machine's file has at most: a bus has 127 nodes.
 const SECTIONS_MAX: usize = 4000;
 
-/// That no machine has so many sections: nobody could read all that is found in them.
+/// Refuses a text with more sections than any machine has: its findings would fill a book.
 pub(super) fn too_many_sections(text: &str, file: &str) -> Option<ConfigError> {
     let lines = text.lines().map(str::trim_start);
     let count = lines.filter(|line| line.starts_with('[')).count();

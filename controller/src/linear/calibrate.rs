@@ -161,7 +161,7 @@ impl LinearStage<'_> {
             let figures = iso230::evaluate(&measured.series()?).ok();
             self.memory.untried = Some(Untried {
                 id: id.to_owned(),
-                as_found: figures.map(|it| it.accuracy.bidirectional),
+                as_found: figures.map(|figures| figures.accuracy.bidirectional),
             });
         }
         stored

@@ -29,7 +29,12 @@ impl AlignmentPlatform<'_> {
     /// # Errors
     /// When one is damaged, of another kind, belongs to another machine or breaks a limit.
     pub fn load_active(&mut self, store: &Store) -> Result<Vec<(String, Option<String>)>, Failure> {
-        let axes: Vec<_> = self.state.screws.iter().map(|it| it.axis.clone()).collect();
+        let axes: Vec<_> = self
+            .state
+            .screws
+            .iter()
+            .map(|screw| screw.axis.clone())
+            .collect();
         let mut loaded = Vec::new();
         for (at, axis) in axes.into_iter().enumerate() {
             let id = store.active(&axis)?.current;
@@ -55,8 +60,8 @@ impl AlignmentPlatform<'_> {
         id: &str,
     ) -> Result<ScrewCompensation, Failure> {
         let mut screws = self.state.screws.iter();
-        let at = screws.position(|it| it.axis == axis);
-        let known = || self.state.screws.iter().map(|it| it.axis.clone());
+        let at = screws.position(|screw| screw.axis == axis);
+        let known = || self.state.screws.iter().map(|screw| screw.axis.clone());
         let at = at.ok_or_else(|| no_such_axis(axis, &known().collect::<Vec<_>>()))?;
         let record = store.load::<ScrewContent>(id)?;
         record

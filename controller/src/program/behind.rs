@@ -37,7 +37,7 @@ impl Behind {
             if let Err(error) = written {
                 seen.store(error.raw_os_error().unwrap_or(EIO), Ordering::Release);
             }
-            // Nobody may wait for it any more.
+            // The other end may have given up.
             let _ = over.send(());
         })?;
         Ok(Self {
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_takes_nothing_keeps_nobody_waiting() {
+    fn a_file_that_takes_nothing_holds_no_writer() {
         struct Hangs(Mutex<Receiver<()>>);
         impl Write for Hangs {
             fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -97,7 +97,7 @@ impl MoveArgs {
     }
 
     /// # Errors
-    /// When it names an axis twice: nobody knows which place is meant.
+    /// When it names an axis twice: which place is meant is not known.
     pub(crate) fn each_once(&self) -> Result<(), Failure> {
         let names: Vec<&str> = self.named().collect();
         let twice = (1..names.len()).find(|at| names[..*at].contains(&names[*at]));

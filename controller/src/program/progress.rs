@@ -1,4 +1,4 @@
-//! What people see of a procedure that runs: a bar with the time left on a terminal, a line every few seconds elsewhere.
+//! Progress of a procedure as people see it: a bar with the time left on a terminal, a line every few seconds elsewhere.
 
 use core::time::Duration;
 

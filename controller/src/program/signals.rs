@@ -1,7 +1,7 @@
 //! Signals: the first one asks for a controlled stop, and only one that comes after the stop's time ends the program.
 //!
-//! `timeout` and a terminal that closes send two signals at once. The second of them must not leave axes behind that
-//! nobody brings to rest.
+//! `timeout` and a terminal that closes send two signals at once. The second of them must not leave
+//! moving axes behind.
 
 use core::time::Duration;
 use std::io::{self, Read};

@@ -81,7 +81,7 @@ pub(super) fn print(bytes: Vec<u8>) -> Result<Reader, Failure> {
     OUT.reader()
 }
 
-/// Prints what the next picture or line replaces. Nobody waits for that, and a late reader misses some.
+/// Prints what the next picture or line replaces. No caller waits for that, and a late reader misses some.
 ///
 /// # Errors
 /// When something that was printed before could not be written.
@@ -121,7 +121,7 @@ pub(super) fn finish() -> Result<(), Failure> {
     OUT.reader().map(drop)
 }
 
-/// Writes and flushes: at the end of a program nobody looks at errors any more.
+/// Writes and flushes: at the end of a program no error is looked at any more.
 type Write = Arc<dyn Fn(&[u8]) -> io::Result<()> + Send + Sync>;
 
 /// What a writer is given.
@@ -142,7 +142,7 @@ struct Blocked {
 }
 
 impl Blocked {
-    /// Nobody shall look for the cause of a silent screen in the machine.
+    /// The cause of a silent screen is not in the machine.
     fn named(&self) -> Option<String> {
         // Without a machine a reader may take all the time (`| less`).
         let owns_machine = ARE_WAITS_LIMITED.load(Ordering::Relaxed);
@@ -314,7 +314,7 @@ impl Writer {
                 let cleared = self.display.clear();
                 self.put(cleared.as_bytes());
             }
-            // Whoever waited may have given up.
+            // The caller may have given up.
             Given::Awaited(reached) => drop(reached.send(())),
         }
     }
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blocked_reader_holds_nobody_up() {
+    fn a_blocked_reader_holds_no_caller_up() {
         let gate = Arc::new(Mutex::new(Vec::new()));
         let screen = Arc::clone(&gate);
         let write = move |bytes: &[u8]| {

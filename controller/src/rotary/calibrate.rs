@@ -107,7 +107,7 @@ impl RotaryTable<'_> {
     ) -> Result<(), Failure> {
         while let Some(due) = it.due()? {
             let placed = self.read_due(read, &it.run, &due, &mut it.journal)?;
-            // Nobody places the plate again for what the disk has not kept.
+            // A placement that the disk has not kept would ask a person for the plate again.
             settle(&mut self.core, store)?;
             it.take(placed);
         }

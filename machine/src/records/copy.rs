@@ -23,8 +23,8 @@ pub(super) struct RecordsCopy {
 }
 
 impl RecordsCopy {
-    /// Reads the records of the machine whose folder is `root`. What cannot be read is left out: whoever wants it asks
-    /// the disk, and hears why.
+    /// Reads the records of the machine whose folder is `root`. What cannot be read is left out: a later
+    /// question goes to the disk, and hears why.
     pub(super) fn read(files: &dyn Files, root: &Path) -> Self {
         let mut copy = Self::default();
         for folder in ["active", "zeros"] {
@@ -102,7 +102,10 @@ impl RecordsCopy {
 
     /// The file `path` was written. Of those that are not read again only the name is held.
     pub(super) fn set(&mut self, path: &Path, bytes: Option<Vec<u8>>) {
-        if let Some(beside) = path.parent().and_then(|it| self.folders.get_mut(it)) {
+        if let Some(beside) = path
+            .parent()
+            .and_then(|folder| self.folders.get_mut(folder))
+        {
             beside.insert(path.to_owned());
         }
         self.held.take_if(|held| held.0 == path);
@@ -115,7 +118,10 @@ impl RecordsCopy {
     /// The file `path` was removed.
     pub(super) fn remove(&mut self, path: &Path) {
         self.contents.remove(path);
-        if let Some(beside) = path.parent().and_then(|it| self.folders.get_mut(it)) {
+        if let Some(beside) = path
+            .parent()
+            .and_then(|folder| self.folders.get_mut(folder))
+        {
             beside.remove(path);
         }
     }

@@ -35,7 +35,7 @@ enum Order {
 pub enum DiskPace {
     /// By itself: the machine lives on meanwhile.
     Wall,
-    /// Not before everybody waits, as in lockstep with an emulated machine: each change is waited for, and one seed
+    /// Not before all wait, as in lockstep with an emulated machine: each change is waited for, and one seed
     /// stays one log.
     Shared,
 }
@@ -183,7 +183,7 @@ impl Disk {
     ) -> Result<Answer<R>, DiskFailure> {
         let (answer, answers) = sync_channel(1);
         self.send(Order::Question(Box::new(move || {
-            // Nobody may wait for it any more.
+            // The other end may have given up.
             let _ = answer.send(question());
         })))?;
         let progress = Progress::begin(self);

@@ -184,7 +184,7 @@ impl Story {
             assert_eq!(newest.as_ref(), Some(path), "{of}");
         }
         if let Some(path) = &newest {
-            // One that nobody was told of may have no whole header yet.
+            // One that was not told of may have no whole header yet.
             let read = self.store.read_journal::<Points>(path);
             assert!(
                 read.is_ok() || self.kept.journal.is_none(),

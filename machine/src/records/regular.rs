@@ -1,6 +1,6 @@
 //! Regular files of bounded size, in folders that others can write.
 //!
-//! A FIFO would hang whoever opens it, a sparse file takes no disk and all of the memory, and a symbolic link leads
+//! A FIFO would hang its reader, a sparse file takes no disk and all of the memory, and a symbolic link leads
 //! elsewhere.
 
 use std::fs::{File, OpenOptions};
@@ -18,7 +18,7 @@ pub const JOURNAL_MAX: u64 = 256 << 20;
 /// # Errors
 /// When it cannot be opened, is no regular file, or is longer.
 pub fn open_regular(path: &Path, most: u64) -> io::Result<Take<File>> {
-    // Not to wait for somebody at the other end of a FIFO.
+    // Not to wait for the other end of a FIFO.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let opened = OpenOptions::new()
         .read(true)

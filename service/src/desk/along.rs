@@ -22,8 +22,8 @@ pub(crate) struct Judges {
 }
 
 impl Judges {
-    /// Those of `machine`.
-    pub(crate) fn of(machine: &mut Machine, groups: &[Group]) -> Result<Self, Failure> {
+    /// Collects those of `machine`.
+    pub(crate) fn collect(machine: &mut Machine, groups: &[Group]) -> Result<Self, Failure> {
         let mut judges = Self::default();
         for group in groups {
             if let Some(judge) = group.path_judge(machine)? {

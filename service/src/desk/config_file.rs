@@ -5,8 +5,7 @@ use crate::order::Order;
 use crate::request::Caller;
 
 impl Desk {
-    /// That the machine's file says something else by now, which nobody uses. Reads the disk; it is told among the
-    /// events, too.
+    /// Says that the machine's file has another text by now than the one in use. Reads the disk. An event says so, too.
     pub fn config_change(&self, caller: &Caller) -> Option<String> {
         let text = self.shared.fixed.config.change_of_file()?;
         // Where too many orders wait, the answer says it alone.

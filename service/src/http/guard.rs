@@ -139,7 +139,7 @@ pub(super) async fn guard(
     let is_stop = parts.method == Method::POST && parts.uri.path() == STOP;
     if is_stop && let Ok(admitted) = &admitted {
         parts.extensions.insert(admitted.clone());
-        guarded.stops.arrive(stopped_by(By::of(&parts).0.name));
+        guarded.stops.arrive(stopped_by(By::read(&parts).0.name));
     }
     let limit = if is_stop { STOP_TIME } else { BODY_TIME };
     let whole = timeout(limit, whole(body, most)).await;
@@ -246,13 +246,18 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
-        Ok(Self::of(parts))
+        Ok(Self::read(parts))
     }
 }
 
 impl By {
-    fn of(parts: &Parts) -> Self {
-        let text = |name: &str| parts.headers.get(name).and_then(|it| it.to_str().ok());
+    fn read(parts: &Parts) -> Self {
+        let text = |name: &str| {
+            parts
+                .headers
+                .get(name)
+                .and_then(|value| value.to_str().ok())
+        };
         let said = text(CLIENT).unwrap_or_default();
         let name = Known::of(parts).called(said);
         let lease = text(LEASE).map(str::to_owned);
@@ -324,13 +329,13 @@ pub(super) struct Asks {
     /// 1000)`. Where the connection comes from when left out; the owner of the token where there is one.
     #[param(rename = "Truestage-Client")]
     client: Option<String>,
-    /// The token of the lease; without it orders are refused while somebody else has the lease. One that has lapsed is refused,
+    /// The token of the lease; without it orders are refused while another client has the lease. One that has lapsed is refused,
     /// too.
     #[param(rename = "Truestage-Lease")]
     lease: Option<String>,
 }
 
-/// What whoever only waits may say of himself, for the description.
+/// What a client that only waits may say of itself, for the description.
 #[derive(Debug, IntoParams)]
 #[into_params(parameter_in = Header)]
 #[expect(dead_code, reason = "the description alone reads it")]

@@ -37,7 +37,7 @@ use crate::view::{Ending, StorageView};
 const WAIT_MAX: Duration = Duration::from_secs(300);
 /// How often an answer that is held back looks.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
-/// How often whoever waits with the token of the lease keeps it.
+/// How often a wait with the token of the lease keeps it.
 const KEEP_EVERY: Duration = Duration::from_secs(5);
 
 #[derive(utoipa::OpenApi)]
@@ -227,7 +227,7 @@ impl Wait {
     }
 }
 
-/// Whoever waits with the token of the lease keeps it as long as his connection lives.
+/// Keeps the lease whose token a wait has, as long as its connection lives.
 pub(super) fn keep_lease(desk: &Desk, caller: &Caller) {
     if caller.lease.is_some() {
         // Where too many orders wait, the next time is soon enough.

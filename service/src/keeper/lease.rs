@@ -43,7 +43,7 @@ impl Keeper {
         }
     }
 
-    /// Whoever has the lease shows that he is there: it lasts as long again.
+    /// Renews the lease of `caller`: it lasts as long again.
     pub(super) fn keep_lease(&mut self, now: Time, caller: &Caller) {
         let lease = self.lease.as_mut();
         if let Some(lease) = lease.filter(|lease| lease.until > now && lease.is_of(caller)) {
@@ -70,7 +70,7 @@ impl Keeper {
                 taken_from = Some(lease.name.to_string());
                 token
             }
-            // It would be renewed as if nobody could have commanded meanwhile.
+            // It would be renewed as if no other could have commanded meanwhile.
             None if caller.lease.is_some() && !request.force => return Err(lapsed()),
             None => token,
         };

@@ -169,7 +169,7 @@ impl Seat {
     /// What is published of it.
     pub(super) fn sample(&self, machine: &Machine) -> AxisSample {
         let sampled = self.mechanics.sampled(machine, &self.name);
-        // After a freeze of this computer, or of its drive, nobody knows where it is.
+        // After a freeze of this computer, or of its drive, its place is not known.
         let known = sampled.filter(|sampled| machine.now().since(sampled.at) <= KNOWN_FOR);
         let encoder = known.map(|sampled| sampled.position);
         let homed = machine.is_zeroed(&self.name);

@@ -176,8 +176,8 @@ impl End {
     }
 }
 
-/// What of the end of a run outlasts the service: its points are in its journal, and after a restart nobody goes on
-/// with it by this name.
+/// What of the end of a run outlasts the service: its points are in its journal, and after a restart it goes on under
+/// another name.
 pub(super) fn lasting(view: &RunView) -> RunView {
     RunView {
         reached: Vec::new(),

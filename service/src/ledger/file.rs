@@ -85,7 +85,7 @@ impl LedgerFile {
         let above = self.folder().ancestors().skip(1).take(FOLDERS_MADE);
         for folder in above {
             match self.files.sync_folder(folder) {
-                // Nobody made a folder there for this program.
+                // No folder was made there for this program.
                 Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {}
                 synced => synced?,
             }

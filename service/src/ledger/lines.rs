@@ -87,7 +87,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    pub(super) fn of(bytes: &[u8]) -> Self {
+    pub(super) fn parse(bytes: &[u8]) -> Self {
         let mut reading = Self::default();
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -138,7 +138,7 @@ mod tests {
 
     #[track_caller]
     fn check(text: &str, (lines, torn, unreadable): (usize, usize, usize)) {
-        let reading = Reading::of(text.as_bytes());
+        let reading = Reading::parse(text.as_bytes());
         let seen = (reading.lines.len(), reading.torn, reading.unreadable);
         assert_eq!(seen, (lines, torn, unreadable), "{text}");
     }
@@ -174,7 +174,7 @@ mod tests {
         for at in 0..end {
             let mut bytes = text.clone().into_bytes();
             bytes[at] ^= 2;
-            let reading = Reading::of(&bytes);
+            let reading = Reading::parse(&bytes);
             assert_eq!((reading.lines.len(), reading.unreadable), (1, 1), "{at}");
         }
     }

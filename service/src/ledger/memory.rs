@@ -138,7 +138,7 @@ impl Memory {
         }
     }
 
-    /// Takes an end; `None` where it was known, or nobody asks for it after a restart.
+    /// Takes an end; `None` where it was known, or is not asked for after a restart.
     pub(super) fn end(&mut self, end: Arc<End>) -> Option<Arc<End>> {
         let entry = self.entries.get_mut(end.id())?;
         if entry.end.as_ref().is_some_and(|known| known.is_same(&end)) {

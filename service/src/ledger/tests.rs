@@ -79,7 +79,7 @@ fn ask(ledger: &Ledger, writer: &mut Writer, asked: Asked) -> Result<Noted, Prob
     let asked = Arc::new(asked);
     match ledger.begin_note(&asked)? {
         Begun::Before(id) => Ok(Noted::Before(id)),
-        Begun::Beside => panic!("nobody else asks"),
+        Begun::Beside => panic!("no other asks"),
         Begun::Writing(answer) => {
             writer.write();
             let answered = answer.try_recv();
@@ -169,7 +169,7 @@ fn an_end_is_kept_once_it_is_on_the_disk() {
 }
 
 #[test]
-fn a_request_that_nobody_writes_is_taken_back() {
+fn a_request_that_is_not_written_is_taken_back() {
     let files = SimulatedFiles::new();
     let (ledger, mut writer) = open(&files);
     let waiting = motion(&ledger, Some("one"));

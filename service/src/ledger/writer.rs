@@ -92,7 +92,7 @@ impl Ledger {
         if let Some(name) = &memory.damaged {
             warnings.push(format!(
                 "the ledger is damaged ({unreadable} lines): it is kept as {name}, and requests with a key are refused \
-                 until somebody accepts that (POST /v1/ledger/accept)"
+                 until a person accepts that (POST /v1/ledger/accept)"
             ));
         }
         if torn > 0 {
@@ -308,7 +308,7 @@ impl Writer {
                 && are_due(note)
             {
                 state.memory.note(&note.id);
-                // Whoever waits too long has gone.
+                // A request that waited too long has gone.
                 let _ = note.answer.try_send(Ok(()));
             }
         }
@@ -350,7 +350,7 @@ fn refuse_notes(state: &mut State, items: Vec<Item>, cause: &str) -> Vec<Item> {
     for item in notes {
         if let ItemOf::Note(note) = item.of {
             state.memory.forget(&note.id);
-            // Whoever waits too long has gone.
+            // A request that waited too long has gone.
             let _ = note.answer.try_send(Err(problem.clone()));
         }
     }
@@ -362,7 +362,7 @@ fn read(files: &dyn Files, path: &Path) -> io::Result<Found> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         read => read?,
     };
-    let reading = Reading::of(&bytes);
+    let reading = Reading::parse(&bytes);
     let written = reading.lines.iter().rev().find_map(|line| match line {
         Line::File(identity) => Some(identity.clone()),
         _ => None,

@@ -7,7 +7,7 @@ use serde::de::{Error, MapAccess, Visitor};
 
 use super::Target;
 
-/// Reads targets; of an axis that is named twice nobody knows which place is meant.
+/// Reads targets. An axis that is named twice is refused: which place is meant is not known.
 pub(super) fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Target, D::Error> {
     from.deserialize_map(Targets)
 }

@@ -19,7 +19,7 @@ impl Kept {
         let found = ask_disk(&mut self.machine, &self.store, move |store| {
             store.interrupted_run(kind.stage().text(), group.journals())
         });
-        Ok(found?.ok().flatten().map(|it| it.journal))
+        Ok(found?.ok().flatten().map(|found| found.journal))
     }
 
     /// One run, from its begin to its end.
@@ -65,7 +65,7 @@ impl Kept {
     fn settle(&mut self, id: &str, mut found: Found) {
         let mut keeper = self.keeper.borrow_mut();
         let is_ending = self.machine.stop_request().is_requested();
-        match found.bad.take_if(|it| it.stops_the_machine()) {
+        match found.bad.take_if(|failure| failure.stops_the_machine()) {
             Some(failure) => {
                 keeper.run_found(id, found);
                 drop(keeper);
@@ -92,7 +92,7 @@ impl Kept {
             }
             None if task.is_resumed => {
                 let newest = self.newest_journal(task)?;
-                newest.filter(|it| before.as_ref() != Some(it))
+                newest.filter(|journal| before.as_ref() != Some(journal))
             }
             None => None,
         };
@@ -136,5 +136,5 @@ impl Kept {
 
 /// Whether a run can go on with `journal`.
 fn is_incomplete(journal: &Path) -> bool {
-    read_journal::<AnyLog>(journal).is_ok_and(|it| !it.complete)
+    read_journal::<AnyLog>(journal).is_ok_and(|read| !read.complete)
 }

@@ -1,4 +1,4 @@
-//! Ends of motions and runs, for whoever waits for one.
+//! Ends of motions and runs.
 
 use super::{MotionView, RunView};
 

@@ -10,6 +10,6 @@ pub struct StorageView {
     pub ok: bool,
     /// Why not.
     pub cause: Option<String>,
-    /// Where a ledger is kept that could not be read: requests with a key are refused until somebody accepts that.
+    /// Where a ledger is kept that could not be read: requests with a key are refused until a person accepts that.
     pub damaged: Option<String>,
 }

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_drawn_where_nobody_looks() {
+    fn nothing_is_drawn_without_a_reader() {
         let mut display = Display::Nothing;
         assert_eq!(display.take(steps(1)) + &display.clear(), "");
     }

@@ -111,8 +111,7 @@ impl Disk {
 
     fn check_folder_above(&self, path: &Path) -> io::Result<()> {
         let above = path.parent().unwrap_or(Path::new(""));
-        let is_root = above.as_os_str().is_empty() || above == Path::new("/");
-        if is_root || self.names.get(above) == Some(&Node::Folder) {
+        if !is_made(&above) || self.names.get(above) == Some(&Node::Folder) {
             Ok(())
         } else {
             Err(io::ErrorKind::NotFound.into())
@@ -212,18 +211,19 @@ impl SimulatedFiles {
         }
         let durable = disk.durable_names.clone();
         let is_reachable = |path: &Path| {
-            let mut above = path.ancestors().skip(1);
-            above.all(|it| {
-                it.parent().is_none_or(|_| {
-                    it.as_os_str().is_empty() || durable.get(it) == Some(&Node::Folder)
-                })
-            })
+            let mut above = path.ancestors().skip(1).filter(is_made);
+            above.all(|folder| durable.get(folder) == Some(&Node::Folder))
         };
         disk.durable_names.retain(|path, _| is_reachable(path));
         disk.names = disk.durable_names.clone();
         disk.has_ended = false;
         disk.faults.clear();
     }
+}
+
+/// Whether a folder has to be made: the root and the folder of the program are there.
+fn is_made(folder: &&Path) -> bool {
+    folder.parent().is_some() && !folder.as_os_str().is_empty()
 }
 
 impl Files for SimulatedFiles {
@@ -250,11 +250,9 @@ impl Files for SimulatedFiles {
     fn make_folder(&self, folder: &Path) -> io::Result<()> {
         let missing: Vec<_> = {
             let disk = self.disk();
-            let above = folder.ancestors().filter(|it| it.parent().is_some());
-            above
-                .filter(|it| !it.as_os_str().is_empty() && !disk.names.contains_key(*it))
-                .map(Path::to_owned)
-                .collect()
+            let folders = folder.ancestors().filter(is_made);
+            let missing = folders.filter(|folder| !disk.names.contains_key(*folder));
+            missing.map(Path::to_owned).collect()
         };
         for folder in missing.iter().rev() {
             {

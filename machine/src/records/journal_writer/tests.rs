@@ -197,7 +197,7 @@ fn what_cannot_follow_is_refused_with_its_line() {
     assert!(line, "{refused}");
 }
 
-/// Whoever can write into the folder has put it there.
+/// A stranger has put it into the folder.
 fn refusal_of(path: &Path) -> String {
     let refused = read(path).unwrap_err().to_string();
     let entries = read_entries(path).unwrap_err().to_string();
