@@ -4,7 +4,8 @@
 //! faster than asked by more than a tenth, no "Standstill" of an axis that moves, no zero that is none,
 //! and no motion that begins after a stop was answered.
 //!
-//! `HISTORIES` is how many are played, `HISTORY` the only one that is played, with its story.
+//! `HISTORIES` is how many are played from the seed `FROM` on, `HISTORY` the only one that is played, with
+//! its story.
 
 mod draw;
 mod healthy;
@@ -93,9 +94,21 @@ impl Played {
     }
 }
 
-/// Plays the histories from 1 to `count`, several at once; returns those that are wrong.
+/// The whole number in the variable `name` of the environment, if there is one.
+fn number(name: &str) -> Option<u64> {
+    let text = std::env::var(name).ok()?;
+    Some(text.parse().expect("a whole number"))
+}
+
+/// The first of the seeds that are drawn; another one draws machines that no run has seen.
+fn first_seed() -> u64 {
+    number("FROM").unwrap_or(1)
+}
+
+/// Plays `count` histories, several at once; returns those that are wrong.
 fn play_all(count: u64) -> Vec<Played> {
-    let next = AtomicU64::new(1);
+    let next = AtomicU64::new(first_seed());
+    let end = first_seed() + count;
     let wrong = Mutex::new(vec![]);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     // A history is two threads, of which one waits.
@@ -105,7 +118,7 @@ fn play_all(count: u64) -> Vec<Played> {
             scope.spawn(|| {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed > count {
+                    if seed >= end {
                         return;
                     }
                     let played = play(seed);
@@ -124,10 +137,6 @@ fn play_all(count: u64) -> Vec<Played> {
 
 #[test]
 fn no_history_moves_an_axis_unasked() {
-    let number = |name: &str| {
-        let text = std::env::var(name).ok()?;
-        Some(text.parse::<u64>().expect("a whole number"))
-    };
     if let Some(seed) = number("HISTORY") {
         let played = play(seed);
         println!("{}", played.text());

@@ -2,7 +2,8 @@
 //!
 //! Each zeroes, moves, jogs, follows a path, is stopped and goes on; no axis may be called astray.
 //!
-//! `HEALTHY=600 cargo test -p tests --test systems sound_machines -- --nocapture` counts more of them.
+//! `HEALTHY=600 cargo test -p tests --test systems sound_machines -- --nocapture` counts more of them, with
+//! `FROM=1001` other ones.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -23,6 +24,7 @@ use super::judge::{AxisFacts, Judge};
 use super::kind::{Kind, LINEAR_STAGE, ROTARY_TABLE, THREE_AXES};
 use super::player::Player;
 use super::stage::Stage;
+use super::{first_seed, number};
 
 /// So many machines in every run.
 const USUAL: u64 = 48;
@@ -461,14 +463,15 @@ fn live_platform(seed: u64, dice: &mut Dice) -> Day {
 }
 
 fn live_all(count: u64) -> Vec<Day> {
-    let (next, days) = (AtomicU64::new(1), Mutex::new(vec![]));
+    let (next, days) = (AtomicU64::new(first_seed()), Mutex::new(vec![]));
+    let end = first_seed() + count;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..4 * cores {
             scope.spawn(|| {
                 loop {
                     let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed > count {
+                    if seed >= end {
                         return;
                     }
                     let day = live(seed);
@@ -484,9 +487,9 @@ fn live_all(count: u64) -> Vec<Day> {
 
 #[test]
 fn sound_machines_of_all_sorts_raise_no_alarm() {
-    let count = std::env::var("HEALTHY").map_or(USUAL, |text| text.parse().expect("a number"));
-    if let Ok(seed) = std::env::var("HEALTHY_SEED") {
-        let day = live(seed.parse().expect("a number"));
+    let count = number("HEALTHY").unwrap_or(USUAL);
+    if let Some(seed) = number("HEALTHY_SEED") {
+        let day = live(seed);
         println!("{} {}\n  {}", day.seed, day.name, day.story);
         return;
     }
