@@ -71,9 +71,20 @@ impl Emulated {
     /// # Errors
     /// When the description is wrong or lacks a port.
     pub fn new(toml: &str, seed: u64, config: &MachineConfig) -> Result<Self, EmulatedError> {
-        let emulated = EmulatedConfig::parse(toml)?;
-        let ports = match_ports(&emulated, config)?;
-        let simulation = Simulation::new(&emulated, seed)?;
+        Self::with_config(&EmulatedConfig::parse(toml)?, seed, config)
+    }
+
+    /// The same of a description that has been read.
+    ///
+    /// # Errors
+    /// When the description is wrong or lacks a port.
+    pub fn with_config(
+        emulated: &EmulatedConfig,
+        seed: u64,
+        config: &MachineConfig,
+    ) -> Result<Self, EmulatedError> {
+        let ports = match_ports(emulated, config)?;
+        let simulation = Simulation::new(emulated, seed)?;
         let mut hosts = vec![None; emulated.ports.len()];
         for (host, simulated) in &ports {
             hosts[usize::from(simulated.0)] = Some(*host);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use drivers::transport::Transport;
 use machine::records::Store;
+use mock_bus::config::MachineConfig as EmulatedConfig;
 use truestage::Machine;
 use truestage::config::{self, Loaded};
 use truestage::emulated::{Emulated, HallDrift};
@@ -162,11 +163,26 @@ impl Bench {
         emulated: impl Fn(String) -> String,
         wrap: impl FnOnce(drivers::transport::in_process::InProcess<Emulated>) -> Box<dyn Transport>,
     ) -> Self {
+        let text = emulated(shipped.emulated.to_owned());
+        let emulated = EmulatedConfig::parse(&text).unwrap_or_else(|error| panic!("{error}"));
+        Self::of_emulated(shipped, seed, machine, &emulated, wrap)
+    }
+
+    /// Any machine that ships, with changes to its configuration, on these devices.
+    ///
+    /// # Panics
+    /// When the changed text is none any more, or the devices are others.
+    pub fn of_emulated(
+        shipped: &Shipped,
+        seed: u64,
+        machine: impl Fn(String) -> String,
+        emulated: &EmulatedConfig,
+        wrap: impl FnOnce(drivers::transport::in_process::InProcess<Emulated>) -> Box<dyn Transport>,
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let loaded = shipped_config(shipped, folder.path(), machine);
-        let text = emulated(shipped.emulated.to_owned());
-        let emulated =
-            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
+        let emulated = Emulated::with_config(emulated, seed, &loaded.config)
+            .unwrap_or_else(|error| panic!("{error}"));
         let machine = Machine::new(&loaded, wrap(emulated.transport()));
         let store = truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name);
         Self {

@@ -6,6 +6,7 @@ mod rotary;
 mod volumetric;
 
 use machine::records::Store;
+use mock_bus::config::MachineConfig as EmulatedConfig;
 use truestage::{Failure, Machine};
 
 use crate::Edit;
@@ -26,6 +27,26 @@ impl Cycle {
     /// The machine with `seed`, not started.
     pub fn bench(&self, seed: u64) -> Bench {
         Bench::of(self.shipped, seed, self.machine)
+    }
+
+    /// The same machine on the devices that `change` makes of those that ship.
+    ///
+    /// # Panics
+    /// When the devices that ship are none.
+    pub fn bench_on(&self, seed: u64, change: impl FnOnce(&mut EmulatedConfig)) -> Bench {
+        let mut emulated = EmulatedConfig::parse(self.shipped.emulated).expect("it ships");
+        change(&mut emulated);
+        Bench::of_emulated(self.shipped, seed, self.machine, &emulated, |it| {
+            Box::new(it)
+        })
+    }
+
+    /// What it does until something fails; the number of the log, and the failure.
+    pub fn try_run(&self, bench: Bench) -> (u64, Option<Failure>) {
+        let emulated = bench.emulated.clone();
+        let failure = (self.run)(bench).err();
+        let hash = emulated.simulation().log_hash();
+        (hash, failure)
     }
 
     /// All that it does; the machine as it is left.

@@ -22,7 +22,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use mock_bus::config::MachineConfig as EmulatedConfig;
 use tests::shipped_config;
 
-use draw::{Dice, draw_quirks, draw_steps};
+use draw::draw_steps;
+pub(super) use draw::{Dice, draw_quirks};
 use judge::{Judge, Violation, Wrong};
 use kind::{Kind, LINEAR_STAGE, ROTARY_TABLE, THREE_AXES};
 use player::Player;

@@ -27,6 +27,7 @@ mod rotary_table;
 mod rotary_uncertainty;
 mod rotary_worse;
 mod serial_zero;
+mod storms;
 mod survey;
 mod table_uncertainty;
 mod thermometer_share;

@@ -1,8 +1,9 @@
 //! A seed is the same log on every computer and in every build: one log of each kind of machine is
 //! pinned.
 //!
-//! Beside this file lies an excerpt of each log: its number, and of every stretch of lines a number and
-//! its first line, so that a failure tells where two logs part.
+//! In `systems/pinned` lies an excerpt of each log: its number, and of every stretch of lines a number and
+//! its first line, so that a failure tells where two logs part. `parts.txt` has the numbers of further seeds,
+//! `storms.txt` those of storms.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -10,6 +11,8 @@ use std::path::PathBuf;
 use tests::cycles::PARTS;
 
 const SEED: u64 = 1;
+/// The seeds whose logs have a number each.
+const SEEDS: core::ops::RangeInclusive<u64> = 1..=20;
 /// So many lines of a log are one stretch of the excerpt.
 const STRETCH: usize = 1000;
 /// Whoever means to change what happens on the buses runs the test once with this set.
@@ -24,23 +27,40 @@ struct Log {
 /// The log of the machine that ships as `name` is the one that is pinned.
 #[track_caller]
 pub(super) fn check(name: &str) {
-    let log = log_of(name);
+    check_text(name, &excerpt(&log_of(name)));
+}
+
+/// The file of `name` has the text `now`.
+#[track_caller]
+pub(super) fn check_text(name: &str, now: &str) {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("systems/pinned");
     let path = path.join(format!("{name}.txt"));
-    let now = excerpt(&log);
     if std::env::var_os(AGAIN).is_some() {
-        std::fs::write(&path, &now).expect("the excerpt can be written");
+        std::fs::write(&path, now).expect("the excerpt can be written");
         return;
     }
     let pinned = std::fs::read_to_string(&path);
     let pinned = pinned.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert!(
         pinned == now,
-        "{name}, seed {SEED}: {}\nWhoever has optimised or moved code has changed what it does. Where that \
-         is meant, note it in CHANGELOG.md and pin the log again: {AGAIN}=1 cargo test -p tests --test \
+        "{name}: {}\nWhoever has optimised or moved code has changed what it does. Where that is meant, note \
+         it in CHANGELOG.md and pin the log again: {AGAIN}=1 cargo test -p tests --test \
          systems pinned",
-        difference(&pinned, &now)
+        difference(&pinned, now)
     );
+}
+
+#[test]
+fn further_seeds_have_the_logs_that_are_pinned() {
+    let mut text = String::new();
+    for part in &PARTS {
+        for seed in SEEDS {
+            let bench = part.run(part.bench(seed));
+            let hash = bench.emulated.simulation().log_hash();
+            writeln!(text, "{} {seed} {hash:016x}", part.name).expect("a text takes every line");
+        }
+    }
+    check_text("parts", &text);
 }
 
 fn log_of(name: &str) -> Log {

@@ -11,18 +11,18 @@ use tests::random;
 use super::kind::Kind;
 
 /// Numbers by chance.
-pub(super) struct Dice(u64);
+pub(in crate::virtual_time) struct Dice(u64);
 
 impl Dice {
-    pub(super) const fn new(seed: u64) -> Self {
+    pub(in crate::virtual_time) const fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x2545_F491_4F6C_DD1D))
     }
 
-    pub(super) fn share(&mut self) -> f64 {
+    pub(in crate::virtual_time) fn share(&mut self) -> f64 {
         random(&mut self.0)
     }
 
-    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(in crate::virtual_time) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.share()
     }
 
@@ -39,7 +39,7 @@ impl Dice {
         self.one_of(&axes)
     }
 
-    pub(super) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
+    pub(in crate::virtual_time) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         let at = (self.share() * choices.len() as f64) as usize;
         choices[at.min(choices.len() - 1)]
     }
@@ -192,7 +192,10 @@ fn draw_fault(dice: &mut Dice, kind: &Kind, axis: usize) -> Step {
 }
 
 /// Gives a drive of `emulated` its quirks; returns what they are.
-pub(super) fn draw_quirks(dice: &mut Dice, emulated: &mut EmulatedConfig) -> Vec<String> {
+pub(in crate::virtual_time) fn draw_quirks(
+    dice: &mut Dice,
+    emulated: &mut EmulatedConfig,
+) -> Vec<String> {
     let drives = emulated.nodes.iter_mut();
     let drives = drives.filter_map(|node| match &mut node.device {
         DeviceConfig::Cia402Drive(drive) => Some(drive),
@@ -200,11 +203,11 @@ pub(super) fn draw_quirks(dice: &mut Dice, emulated: &mut EmulatedConfig) -> Vec
     });
     let mut drives: Vec<_> = drives.collect();
     let at = (dice.share() * drives.len() as f64) as usize;
-    let drive = &mut drives[at];
     // Some drives are polite.
-    if dice.falls(0.25) {
+    if dice.falls(0.25) || drives.is_empty() {
         return vec![];
     }
+    let drive = &mut drives[at];
     let mut drawn = vec![];
     for quirk in QUIRKS {
         if dice.falls(2.5 / QUIRKS.len() as f64) {
