@@ -12,9 +12,9 @@ use compensator::rotary::{
     Criterion, PeriodicCompensation, PeriodicInterpolation, PeriodicLimits, PeriodicTable,
     SolveOptions, plan, solve,
 };
-use compensator::rotary::{Placement, RotarySeries};
 use serde_json::{Value, json};
-use tests::{normal, random};
+use tests::random;
+use tests::specimens::plate::{series, table_arcsec};
 use units::Radians;
 
 const REPETITIONS: usize = 101;
@@ -28,29 +28,6 @@ fn main() {
         Some("times") => println!("{}", times()),
         _ => eprintln!("rotary: run by tests/bench/run"),
     }
-}
-
-fn table_arcsec(position: usize, lines: usize) -> f64 {
-    let angle = core::f64::consts::TAU * position as f64 / lines as f64;
-    6.0 * angle.cos() + 3.0 * (2.0 * angle).sin() + (36.0 * angle).sin()
-}
-
-/// ±10″ of table, ±30″ of plate, noise of about 0.05″.
-fn series(lines: usize, offsets: &[usize]) -> RotarySeries {
-    let mut state = lines as u64;
-    let plate: Vec<f64> = (0..lines)
-        .map(|_| 60.0 * random(&mut state) - 30.0)
-        .collect();
-    let placements = offsets.iter().map(|&offset| {
-        let mut read = |line: usize| {
-            let noise = normal(&mut state);
-            let table = table_arcsec((line + offset) % lines, lines);
-            Some(Radians::from_arcsec(table + plate[line] + 0.05 * noise))
-        };
-        let readings = (0..lines).map(&mut read).collect();
-        Placement { offset, readings }
-    });
-    RotarySeries::new(lines, placements.collect()).unwrap()
 }
 
 fn seconds(work: impl FnOnce()) -> f64 {

@@ -8,9 +8,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use compensator::error_table::{Compensation, EndPolicy, ErrorTable, Interpolation, Limits, Node};
+use compensator::error_table::{Compensation, Interpolation};
 use serde_json::{Value, json};
-use tests::random;
+use tests::specimens::stroke::{compensation, targets};
 use units::{Approach, Metres, MetresPerSecond};
 
 const LENGTHS: [u32; 3] = [20, 2_000, 20_000];
@@ -19,7 +19,6 @@ const INTERPOLATIONS: [(&str, Interpolation); 3] = [
     ("linear", Interpolation::Linear),
     ("monotone cubic", Interpolation::MonotoneCubic),
 ];
-const STROKE_M: f64 = 0.06;
 const REPETITIONS: usize = 25;
 const CALLS: usize = 200_000;
 /// Targets fit the second-level cache beside any table; a power of two.
@@ -34,42 +33,14 @@ fn main() {
             let interpolation = INTERPOLATIONS.iter().find(|(known, _)| *known == name);
             let (_, interpolation) = interpolation.expect("a known interpolation");
             let compensation = compensation(*interpolation, nodes.parse().unwrap());
-            black_box(in_a_row(&compensation, &targets(), calls.parse().unwrap()));
+            black_box(in_a_row(
+                &compensation,
+                &targets(TARGETS),
+                calls.parse().unwrap(),
+            ));
         }
         _ => eprintln!("table: run by tests/bench/run"),
     }
-}
-
-/// ±10 µm in two waves and some noise, reverse 1 µm beside forward, at even distances.
-fn compensation(interpolation: Interpolation, nodes: u32) -> Compensation {
-    let mut state = u64::from(nodes);
-    let step_m = STROKE_M / f64::from(nodes - 1);
-    let noise_m = 0.2e-6_f64.min(step_m * 1e-3);
-    let node = |at: u32| {
-        let phase = f64::from(at) * step_m / STROKE_M * 4.0 * core::f64::consts::PI;
-        let forward = Metres(10e-6 * phase.sin() + noise_m * random(&mut state));
-        Node {
-            position: Metres(f64::from(at) * step_m),
-            forward: Some(forward),
-            reverse: Some(forward + Metres::from_um(1.0)),
-            u_forward: Some(Metres::from_um(0.1)),
-            u_reverse: Some(Metres::from_um(0.1)),
-        }
-    };
-    let table = ErrorTable::new((0..nodes).map(node).collect()).unwrap();
-    let limits = Limits {
-        size: Metres::from_um(50.0),
-        slope: 0.1,
-        rate: MetresPerSecond(1.0),
-    };
-    Compensation::new(table, interpolation, limits, EndPolicy::Hold).unwrap()
-}
-
-fn targets() -> Vec<Metres> {
-    let mut state = 1;
-    (0..TARGETS)
-        .map(|_| Metres(STROKE_M * random(&mut state)))
-        .collect()
 }
 
 /// What is measured: targets to set-points.
@@ -201,7 +172,7 @@ fn both(table: &impl Correct, targets: &[Metres]) -> (f64, f64) {
 
 /// Repetitions go round all cases, so that a disturbance hits each of them.
 fn times() -> Value {
-    let targets = targets();
+    let targets = targets(TARGETS);
     let mut cases = Vec::new();
     for (name, interpolation) in INTERPOLATIONS {
         for nodes in LENGTHS {

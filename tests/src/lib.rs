@@ -25,6 +25,7 @@ mod random;
 mod rig;
 mod shipped;
 mod slcan_hub;
+pub mod specimens;
 mod spot_cameras;
 mod stand;
 pub mod stream;
