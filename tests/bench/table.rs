@@ -11,7 +11,7 @@ use std::time::Instant;
 use compensator::error_table::{Compensation, Interpolation};
 use serde_json::{Value, json};
 use tests::specimens::stroke::{compensation, targets};
-use units::{Approach, Metres, MetresPerSecond};
+use units::{Approach, Metres};
 
 const LENGTHS: [u32; 3] = [20, 2_000, 20_000];
 const INTERPOLATIONS: [(&str, Interpolation); 3] = [

@@ -51,6 +51,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("unit-tests", &["units", "wire", "drivers", "compensator"]),
+    ("counts", &["units", "wire", "compensator", "tests"]),
 ];
 
 /// The only files of the controller that may name the emulator.

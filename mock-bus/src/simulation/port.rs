@@ -144,8 +144,10 @@ impl PortState {
         match &mut self.medium {
             Medium::Can(_) => None,
             Medium::Serial(line) => {
-                let (_, payload) = line.to_device.pop_front_if(|(at, _)| *at <= now)?;
-                Some(payload)
+                let is_due = line.to_device.front()?.0 <= now;
+                is_due
+                    .then(|| line.to_device.pop_front())?
+                    .map(|(_, payload)| payload)
             }
         }
     }
