@@ -102,9 +102,6 @@ impl CanBus {
     }
 
     fn winner(&self) -> Option<usize> {
-        if self.pending.len() < 2 {
-            return self.pending.len().checked_sub(1);
-        }
         let host_head = self
             .pending
             .iter()

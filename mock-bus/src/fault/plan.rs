@@ -161,11 +161,6 @@ impl Plan {
         Some(edge)
     }
 
-    /// Whether something goes wrong at present.
-    pub(crate) fn is_active(&self) -> bool {
-        self.faults.iter().any(|fault| fault.phase == Phase::Active)
-    }
-
     /// What the faults make of a frame on `port` that `node` sent (`None`: not a device).
     pub(crate) fn frame_fate(
         &mut self,

@@ -74,7 +74,6 @@ impl Simulation {
             return false;
         }
         self.mains_back = Time::NEVER;
-        self.plant.advance(self.now);
         self.switch_on();
         true
     }

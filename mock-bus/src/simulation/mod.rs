@@ -9,7 +9,6 @@ mod effects;
 mod log;
 mod mains;
 mod port;
-mod step;
 mod traffic;
 mod travel;
 
@@ -31,7 +30,7 @@ use wire::can::BusError;
 use wire::{Payload, Port};
 
 use crate::config::{ConfigError, MachineConfig};
-use crate::fault::{FaultConfig, FaultId, Plan};
+use crate::fault::{Edge, FaultConfig, FaultId, Plan};
 use crate::node::Node;
 use crate::plant::{Plant, Sight, Truth};
 use log::{Direction, Log};
@@ -396,7 +395,6 @@ impl Simulation {
         self.log.lines()
     }
 
-    /// The machine at `to`, to be looked at.
     fn move_clock(&mut self, to: Time) {
         self.now = self.now.max(to);
         self.plant.advance(self.now);
@@ -406,6 +404,70 @@ impl Simulation {
         let next = self.next.get().unwrap_or_else(|| self.find_next());
         self.next.set(Some(next));
         next
+    }
+
+    fn find_next(&self) -> Time {
+        let ports = self.ports.iter().map(|port| port.next_event(self.now));
+        let slots = self.slots.iter().map(|slot| slot.next);
+        let own = self.plan.next_edge().min(self.mains_back);
+        ports.chain(slots).fold(own, Time::min)
+    }
+
+    /// Everything that is due at `next`; an arbitration only when nothing else is.
+    fn step(&mut self, next: Time) {
+        self.move_clock(next);
+        self.next.set(None);
+        if self.step_faults() | self.step_mains() | self.step_ports() | self.step_nodes() {
+            return;
+        }
+        for port in &mut self.ports {
+            port.arbitrate(self.now);
+        }
+    }
+
+    fn step_faults(&mut self) -> bool {
+        let mut any = false;
+        while let Some(edge) = self.plan.poll_edge(self.now) {
+            any = true;
+            match edge {
+                Edge::Begins(fault) => self.begin_fault(&fault),
+                Edge::Ends(fault) => self.finish_fault(&fault),
+                Edge::Sends(port, frame) => self.stranger_sends(&port, frame),
+            }
+        }
+        any
+    }
+
+    fn step_ports(&mut self) -> bool {
+        let mut any = false;
+        for place in 0..self.ports.len() {
+            while let Some((sender, payload)) = self.ports[place].arrived(self.now) {
+                any = true;
+                match payload {
+                    Payload::Frame(frame) => self.frame_complete(place, sender, frame),
+                    Payload::Bytes(_) | Payload::Control(_) => {
+                        self.tell_nodes(place, sender, &payload)
+                    }
+                }
+            }
+        }
+        any
+    }
+
+    fn step_nodes(&mut self) -> bool {
+        let mut any = false;
+        for place in 0..self.slots.len() {
+            let slot = &mut self.slots[place];
+            if slot.next > self.now {
+                continue;
+            }
+            any = true;
+            slot.node.advance(self.now, &mut self.plant);
+            // A node that asks for this very moment again would stop the clock.
+            slot.next = slot.node.next_event().max(Time(self.now.0 + 1));
+            self.flush(place);
+        }
+        any
     }
 
     fn slot(&self, name: &str) -> Option<usize> {

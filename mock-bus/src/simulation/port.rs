@@ -123,31 +123,19 @@ impl PortState {
         }
     }
 
-    /// Whether something has reached the devices' side by `now`.
-    pub(super) fn arrives_by(&self, now: Time) -> bool {
-        match &self.medium {
-            Medium::Can(can) => can.bus.done_at() <= now,
-            Medium::Serial(line) => line.to_device.front().is_some_and(|(at, _)| *at <= now),
-        }
-    }
-
-    /// The frame that is complete by `now`.
-    pub(super) fn complete(&mut self, now: Time) -> Option<(Sender, CanFrame)> {
+    /// What has reached the devices' side by `now`.
+    pub(super) fn arrived(&mut self, now: Time) -> Option<(Sender, Payload)> {
         match &mut self.medium {
-            Medium::Can(can) => can.bus.complete(now),
-            Medium::Serial(_) => None,
-        }
-    }
-
-    /// What has reached the devices at the serial line by `now`.
-    pub(super) fn arrived(&mut self, now: Time) -> Option<Payload> {
-        match &mut self.medium {
-            Medium::Can(_) => None,
+            Medium::Can(can) => {
+                let (sender, frame) = can.bus.complete(now)?;
+                Some((sender, Payload::Frame(frame)))
+            }
             Medium::Serial(line) => {
-                let is_due = line.to_device.front()?.0 <= now;
-                is_due
-                    .then(|| line.to_device.pop_front())?
-                    .map(|(_, payload)| payload)
+                if line.to_device.front()?.0 > now {
+                    return None;
+                }
+                let (_, payload) = line.to_device.pop_front()?;
+                Some((Sender::Host, payload))
             }
         }
     }
@@ -191,10 +179,6 @@ impl PortState {
         if let Medium::Serial(line) = &mut self.medium {
             line.kept = bytes;
         }
-    }
-
-    pub(super) fn keeps_bytes(&self) -> bool {
-        matches!(&self.medium, Medium::Serial(line) if !line.kept.is_empty())
     }
 
     pub(super) fn take_kept(&mut self) -> Vec<u8> {

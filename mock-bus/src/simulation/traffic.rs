@@ -13,10 +13,6 @@ use crate::bus::Sender;
 impl Simulation {
     /// A frame has been on the wire: the faults first, then everybody else hears it.
     pub(super) fn frame_complete(&mut self, place: usize, sender: Sender, frame: CanFrame) {
-        if !self.plan.is_active() {
-            self.spread(place, sender, frame, Duration::ZERO);
-            return self.release_held_back(place);
-        }
         let node = match sender {
             Sender::Node(place) => Some(self.slots[place].name.as_str()),
             Sender::Host | Sender::Stranger => None,
@@ -57,7 +53,6 @@ impl Simulation {
             if !slot.node.concerns(payload) {
                 continue;
             }
-            self.plant.advance(self.now);
             slot.node.handle(self.now, payload, &mut self.plant);
             slot.next = slot.node.next_event();
             self.flush(place);
@@ -78,9 +73,6 @@ impl Simulation {
     }
 
     fn node_bytes(&mut self, place: usize, port: usize, bytes: Vec<u8>) {
-        if !self.plan.is_active() && !self.ports[port].keeps_bytes() {
-            return self.bytes_to_host(port, Duration::ZERO, bytes);
-        }
         let mut run = self.ports[port].take_kept();
         run.extend_from_slice(&bytes);
         let node = &self.slots[place].name;
