@@ -9,7 +9,7 @@
 
 use nix::time::{ClockId, clock_gettime};
 use serde_json::{Value, json};
-use tests::cycles::{Cycle, PARTS, WHOLE};
+use tests::cycles::{Cycle, PARTS, WHOLE, named};
 
 const SEEDS: u64 = 5;
 
@@ -68,10 +68,11 @@ fn case(cycle: &Cycle) -> Value {
     })
 }
 
-fn show(cycles: &[Cycle], name: &str, seed: &str) {
-    let cycle = cycles.iter().find(|cycle| cycle.name == name);
-    let cycle = cycle.expect("the name of a machine that ships");
-    let run = run(cycle, seed.parse().expect("a seed is a number"));
+fn show(cycles: &'static [Cycle], name: &str, seed: &str) {
+    let run = run(
+        named(cycles, name),
+        seed.parse().expect("a seed is a number"),
+    );
     println!(
         "{name} {seed}: {:.1} s in {:.3} s of the processor, {:.0} times real time; log {:016x}",
         run.lived_s,

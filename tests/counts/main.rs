@@ -4,6 +4,7 @@
 
 #![expect(missing_docs, reason = "the macros make modules that have none")]
 
+use core::fmt::Debug;
 use core::time::Duration;
 use std::hint::black_box;
 
@@ -16,7 +17,7 @@ use gungraun::{
     Callgrind, LibraryBenchmarkConfig, library_benchmark, library_benchmark_group, main,
 };
 use tests::Bench;
-use tests::cycles::{Cycle, PARTS, WHOLE};
+use tests::cycles::{Cycle, PARTS, WHOLE, named};
 use tests::specimens::{plate, stroke, volume};
 use units::{Metres, Radians};
 use wire::can::CanFrame;
@@ -26,8 +27,7 @@ const SEED: u64 = 1;
 const CALLS: usize = 100;
 
 fn made(cycles: &'static [Cycle], name: &str) -> (&'static Cycle, Bench) {
-    let cycle = cycles.iter().find(|cycle| cycle.name == name);
-    let cycle = cycle.expect("the name of a machine that ships");
+    let cycle = named(cycles, name);
     (cycle, cycle.bench(SEED))
 }
 
@@ -80,12 +80,13 @@ fn model(shape: Shape) -> (VolumetricModel, Conditions, Vec<Point>) {
 
 type InVolume = (VolumetricModel, Conditions, Vec<Point>);
 
-#[library_benchmark]
-#[bench::tables(args = (Shape::Linear), setup = model)]
-#[bench::splines(args = (Shape::Spline), setup = model)]
-fn deviation((model, now, targets): InVolume) -> InVolume {
+/// Does `work` at each target.
+fn at_each<E: Debug>(
+    (model, now, targets): InVolume,
+    work: impl Fn(&VolumetricModel, Point, &Conditions) -> Result<Point, E>,
+) -> InVolume {
     for target in &targets {
-        let _ = black_box(model.deviation(*target, &now));
+        black_box(work(&model, *target, &now).expect("within the volume"));
     }
     (model, now, targets)
 }
@@ -93,11 +94,15 @@ fn deviation((model, now, targets): InVolume) -> InVolume {
 #[library_benchmark]
 #[bench::tables(args = (Shape::Linear), setup = model)]
 #[bench::splines(args = (Shape::Spline), setup = model)]
-fn inverse((model, now, targets): InVolume) -> InVolume {
-    for target in &targets {
-        let _ = black_box(model.command(*target, &now));
-    }
-    (model, now, targets)
+fn deviation(specimen: InVolume) -> InVolume {
+    at_each(specimen, VolumetricModel::deviation)
+}
+
+#[library_benchmark]
+#[bench::tables(args = (Shape::Linear), setup = model)]
+#[bench::splines(args = (Shape::Spline), setup = model)]
+fn inverse(specimen: InVolume) -> InVolume {
+    at_each(specimen, VolumetricModel::command)
 }
 
 fn table(interpolation: Interpolation) -> (Compensation, Vec<Metres>) {
@@ -134,13 +139,21 @@ fn readings() -> (RotarySeries, SolveOptions) {
 #[library_benchmark]
 #[bench::four_placements(setup = readings)]
 fn self_calibration((series, options): (RotarySeries, SolveOptions)) -> RotarySeries {
-    let _ = black_box(solve(&series, &options));
+    black_box(solve(&series, &options).expect("nothing is wrong with it"));
     series
 }
 
+const UMD2_LINE: &str = "16777216 16777321 105 -3 128 4711 0 0";
+
+/// Does `work` so often that its cost shows.
+fn repeat<T>(work: impl Fn() -> T) {
+    for _ in 0..CALLS {
+        let _ = black_box(work());
+    }
+}
+
 fn sample() -> umd2::Sample {
-    let line = "16777216 16777321 105 -3 128 4711 0 0";
-    match umd2::Line::parse(line).expect("a line of the manual's form") {
+    match umd2::Line::parse(UMD2_LINE).expect("a line of the manual's form") {
         umd2::Line::Sample(sample) => sample,
         other => panic!("{other:?}"),
     }
@@ -157,35 +170,27 @@ fn emit_umd2(sample: umd2::Sample) -> Vec<u8> {
 }
 
 #[library_benchmark]
-#[bench::line("16777216 16777321 105 -3 128 4711 0 0")]
+#[bench::line(UMD2_LINE)]
 fn parse_umd2(line: &str) {
-    for _ in 0..CALLS {
-        let _ = black_box(umd2::Line::parse(black_box(line)));
-    }
+    repeat(|| umd2::Line::parse(black_box(line)));
 }
 
 #[library_benchmark]
 #[bench::two_channels(">+1.4567-0.0012")]
 fn parse_dcon(line: &str) {
-    for _ in 0..CALLS {
-        let _ = black_box(dcon::parse_volts(black_box(line)));
-    }
+    repeat(|| dcon::parse_volts(black_box(line)));
 }
 
 #[library_benchmark]
 #[bench::frame(b"t1818A1B2C3D4E5F60718")]
 fn parse_slcan(line: &[u8]) {
-    for _ in 0..CALLS {
-        let _ = black_box(slcan::Reply::parse(black_box(line)));
-    }
+    repeat(|| slcan::Reply::parse(black_box(line)));
 }
 
 #[library_benchmark]
 #[bench::frame(CanFrame::standard(0x181, &[0xA1, 0xB2, 0xC3, 0xD4, 0xE5, 0xF6, 7, 0x18]))]
 fn emit_slcan(frame: CanFrame) {
-    for _ in 0..CALLS {
-        let _ = black_box(slcan::Command::Transmit(black_box(frame)).emit());
-    }
+    repeat(|| slcan::Command::Transmit(black_box(frame)).emit());
 }
 
 library_benchmark_group!(name = cycles, benchmarks = [cycle, wait]);

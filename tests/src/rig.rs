@@ -108,18 +108,7 @@ impl Bench {
         machine: impl Fn(String) -> String,
         emulated: impl Fn(String) -> String,
     ) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let loaded = shipped_config(&ROTARY, folder.path(), machine);
-        let text = emulated(ROTARY.emulated.to_owned());
-        let emulated =
-            Emulated::new(&text, seed, &loaded.config).unwrap_or_else(|error| panic!("{error}"));
-        Self {
-            machine: Machine::new(&loaded, Box::new(emulated.transport())),
-            emulated,
-            store: truestage::for_tests::store_in(folder.path(), &loaded.config.machine.name),
-            loaded,
-            folder,
-        }
+        Self::shaped(&ROTARY, seed, machine, emulated)
     }
 
     /// The same, with the transport wrapped (recorded, say).

@@ -36,8 +36,8 @@ impl Cycle {
     pub fn bench_on(&self, seed: u64, change: impl FnOnce(&mut EmulatedConfig)) -> Bench {
         let mut emulated = EmulatedConfig::parse(self.shipped.emulated).expect("it ships");
         change(&mut emulated);
-        Bench::of_emulated(self.shipped, seed, self.machine, &emulated, |it| {
-            Box::new(it)
+        Bench::of_emulated(self.shipped, seed, self.machine, &emulated, |transport| {
+            Box::new(transport)
         })
     }
 
@@ -76,6 +76,16 @@ pub const PARTS: [Cycle; 5] = [
     rotary::PART,
     volumetric::PART,
 ];
+
+/// The cycle of the machine that ships as `name`.
+///
+/// # Panics
+/// When no machine is called so.
+#[track_caller]
+pub fn named(cycles: &'static [Cycle], name: &str) -> &'static Cycle {
+    let cycle = cycles.iter().find(|cycle| cycle.name == name);
+    cycle.unwrap_or_else(|| panic!("{name}: no machine that ships is called so"))
+}
 
 const fn cycle(
     name: &'static str,

@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use tests::cycles::PARTS;
+use tests::cycles::{PARTS, named};
 
 const SEED: u64 = 1;
 /// The seeds whose logs have a number each.
@@ -43,7 +43,7 @@ pub(super) fn check_text(name: &str, now: &str) {
     let pinned = pinned.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert!(
         pinned == now,
-        "{name}: {}\nWhoever has optimised or moved code has changed what it does. Where that is meant, note \
+        "{name}: {}\nAn optimisation, or code that moved, has changed what is done. Where that is meant, note \
          it in CHANGELOG.md and pin the log again: {AGAIN}=1 cargo test -p tests --test \
          systems pinned",
         difference(&pinned, now)
@@ -64,8 +64,7 @@ fn further_seeds_have_the_logs_that_are_pinned() {
 }
 
 fn log_of(name: &str) -> Log {
-    let part = PARTS.iter().find(|part| part.name == name);
-    let part = part.expect("every machine that ships has one");
+    let part = named(&PARTS, name);
     let bench = part.bench(SEED);
     bench.emulated.simulation_mut().keep_log();
     let bench = part.run(bench);
