@@ -1,5 +1,6 @@
 //! `truestage monitor`: what a kept machine does, as it happens.
 
+use core::time::Duration;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
@@ -28,6 +29,8 @@ fn every_event_is_a_line_from_the_first_one_on_until_the_service_ends() {
         let service = keep(&bench);
         let mut objects = monitor(&bench, &["--json", "monitor", "--all"]);
         let mut texts = monitor(&bench, &["monitor", "--all"]);
+        // Meanwhile the streams say that the machine's thread ticks, which is no event.
+        std::thread::park_timeout(Duration::from_millis(1200));
         let (status, _) = ask(bench.folder(), "POST /v1/stop", &json!({}));
         assert_eq!(status, 200);
         let mut heard = BufReader::new(objects.stdout.take().expect("it is piped")).lines();

@@ -124,6 +124,10 @@ impl Feed {
         let Ok(data) = serde_json::from_str::<Value>(&message.data) else {
             return Ok(());
         };
+        // That the machine's thread ticks is no event.
+        if message.event == "alive" {
+            return Ok(());
+        }
         if message.event == "sample" {
             self.tell(Heard::Axes(data))?;
             return match self.looked.elapsed() > LOOK_EVERY {
